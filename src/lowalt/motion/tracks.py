@@ -52,7 +52,8 @@ class Cell(NamedTuple):
     def room_m(self, positions_m: np.ndarray) -> np.ndarray:
         """Return how far positions (N, 2) m are from leaving the cell: (N,) m, negative outside."""
         side = np.roll(self.corners, -1, axis=0) - self.corners
-        inward = np.stack([-side[:, 1], side[:, 0]], axis=1) / portable.norm(side)[:, None]
+        turned = np.stack([-side[:, 1], side[:, 0]], axis=1)
+        inward = turned / portable.norm(side)[:, None]
         to_sides = portable.dot(positions_m[:, None] - self.corners, inward)
         to_masts = portable.norm(positions_m[:, None] - self.masts_m.reshape(-1, 2))
         return np.concatenate([to_sides, to_masts - self.clearance_m], axis=1).min(axis=1)

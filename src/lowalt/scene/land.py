@@ -249,7 +249,8 @@ def land(
         circles = (len(rings.t), 2, turns)
         both = weight.reshape(circles)
         weight = (both + both[:, ::-1, ::-1])[:, 0].ravel()
-        seen = cosines(station, points).T.reshape(2, *circles)[:, :, 0].reshape(1, 2, -1)
+        on_circles = cosines(station, points).T.reshape(2, *circles)
+        seen = on_circles[:, :, 0].reshape(1, 2, -1)
         slow = np.ones(len(weight))
         counts = counts // 2
     of_cells = counts.reshape(-1, nodes).sum(axis=1)

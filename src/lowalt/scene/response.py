@@ -79,7 +79,8 @@ def response(
         outward = [path.outward for path in all_paths]
         out = _end(view, sender, network.transmit, outward, physics)
     points = back.places[0]
-    reach = float(np.sqrt(np.square(points - points.mean(axis=2, keepdims=True)).sum(axis=1).max()))
+    off_middle = points - points.mean(axis=2, keepdims=True)
+    reach = float(np.sqrt(np.square(off_middle).sum(axis=1).max()))
     if squint:
         # Ranges are then measured from the arrays' middles, whose directions to the points differ.
         ends = (out, back)

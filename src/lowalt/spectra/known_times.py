@@ -38,7 +38,8 @@ def line_sums(
     """
     at = np.flatnonzero(received(signal))
     steps = np.zeros((len(turns), len(signal) + 1), np.complex128)
-    steps[:, at + 1] = signal[at] * np.exp(-2j * np.pi * np.outer(turns, times[at]))
+    phases = -2j * np.pi * np.outer(turns, times[at])
+    steps[:, at + 1] = signal[at] * np.exp(phases)
     summed = np.cumsum(steps, axis=1)
     return summed[:, window : window + starts] - summed[:, :starts]
 

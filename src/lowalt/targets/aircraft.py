@@ -204,14 +204,16 @@ def helicopter(record: dict, f: dict) -> list[Part]:
     high = f["body_height"]
     chord = 0.45 * f["fin_height"]
     reach = f["tail_span"] / 2
-    shells += _both(foil([(0, end, level, chord, 0), (reach, end, level, chord, 0)], 0.1))
+    tail_plane = foil([(0, end, level, chord, 0), (reach, end, level, chord, 0)], 0.1)
+    shells += _both(tail_plane)
     half_fin = f["fin_height"] / 2
     fin = foil([(-half_fin, end, 0, chord, 0), (half_fin, end, 0, chord, 0)], 0.1)
     shells += _both(fin.mapped(_UPRIGHT).moved((reach, 0, level)))
     foot = f["skid_track"] / 2
     low = -0.5 * high - f["skid_height"]
     thin = 0.03 * half
-    shells += _both(tube([(foot, -0.45 * long, low), (foot, 0.4 * long, low)], 1.5 * thin, 8))
+    skid = [(foot, -0.45 * long, low), (foot, 0.4 * long, low)]
+    shells += _both(tube(skid, 1.5 * thin, 8))
     for y in (-0.25 * long, 0.2 * long):
         shells += _both(tube([(0.4 * half, y, -0.4 * high), (foot, y, low)], thin, 8))
     return [Part("body", "body", tuple(shells)), _main_rotor(record, f)]
@@ -227,7 +229,8 @@ def tail_rotor(record: dict, f: dict) -> list[Part]:
     fin_height = f["fin_height"]
     chord = 0.35 * fin_height
     arm = -f["tail_arm"]
-    plane = foil([(0, arm, level, chord, 0), (f["tail_span"] / 2, arm, level, 0.8 * chord, 0)], 0.1)
+    half_span = f["tail_span"] / 2
+    plane = foil([(0, arm, level, chord, 0), (half_span, arm, level, 0.8 * chord, 0)], 0.1)
     fin = foil(
         [
             (-0.4 * fin_height, end - 0.3 * chord, 0, 0.6 * chord, 0),

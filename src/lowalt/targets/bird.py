@@ -120,7 +120,8 @@ def _outer(wrist: np.ndarray, half_span: float, chord: float, f: dict) -> tuple[
         plan = [(0, 0.95), (0.35, 0.87), (0.62, 0.76)]
     rows = []
     for t, c in plan:
-        rows.append((x + t * reach, y - back * t * math.sqrt(t), z, max(c * chord, c * tip), 0.03))
+        row_y = y - back * t * math.sqrt(t)
+        rows.append((x + t * reach, row_y, z, max(c * chord, c * tip), 0.03))
     if not fingers:
         pointed_end = (half_span, y - 1.1 * back, z, min(0.5 * tip, 0.25 * chord), 0.03)
         return (foil([*rows, pointed_end], 0.06),)

@@ -170,7 +170,9 @@ def stance_speed_mps(
     added back. A foot that stands still has the speed zero. The ground is the feet's lowest point.
     """
     positions = cycle[:, feet]
-    velocity = (np.roll(positions, -1, axis=0) - np.roll(positions, 1, axis=0)) * rate_hz / 2
+    after = np.roll(positions, -1, axis=0)
+    before = np.roll(positions, 1, axis=0)
+    velocity = (after - before) * rate_hz / 2
     velocity[..., 1] += speed_mps
     height = positions[..., 2]
     lowest = height.argmin(axis=1)

@@ -247,7 +247,8 @@ def _repaired(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.n
 
 def edges_of(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the edges (E, 2) of triangles (F, 3), one triangle of each, and how many share it."""
-    edges = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
+    sides = [faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]
+    edges = np.sort(np.concatenate(sides), axis=1)
     key = edges[:, 0] * (int(faces.max()) + 1) + edges[:, 1]
     _, first, uses = np.unique(key, return_index=True, return_counts=True)
     return edges[first], first % len(faces), uses
@@ -259,7 +260,8 @@ def _mesh(vertices: np.ndarray, faces: np.ndarray) -> Mesh:
     Faces that share a vertex are connected.
     """
     links = np.concatenate([faces[:, :2], faces[:, 1:]])
-    graph = coo_array((np.ones(len(links), np.int8), links.T), shape=(len(vertices), len(vertices)))
+    count = len(vertices)
+    graph = coo_array((np.ones(len(links), np.int8), links.T), shape=(count, count))
     label = connected_components(graph, directed=False)[1]
     component = np.unique(label[faces[:, 0]], return_inverse=True)[1]
     closed = np.ones(int(component.max()) + 1, bool)

@@ -167,9 +167,9 @@ def cut_parts(
 
     The body's pool comes first.
 
-    sampled: gives the pool of a mesh and whether it is the body; wheel: gives points and normals
-    (N, 3) of a made right wheel at the origin, in body axes, from its diameter and width (m); frame
-    (3, 3): body axes in the file's.
+    sampled: gives the pool of a mesh, told whether that is the body; wheel: gives points and
+    normals (N, 3) of a made right wheel at the origin, in body axes, from its diameter and width
+    (m); frame (3, 3): body axes in the file's.
     Raises: InputError naming the file, or the part whose region holds nothing.
     """
     where = record["subtype"]

@@ -136,7 +136,8 @@ def read_obj(path: Path) -> list[Piece]:
                 if len(positions[-1]) < 3:
                     raise ValueError("fewer than three coordinates")
             elif word == "f":
-                face = [int(corner.split("/", 1)[0]) for corner in values.split("#", 1)[0].split()]
+                stated_corners = values.split("#", 1)[0].split()
+                face = [int(corner.split("/", 1)[0]) for corner in stated_corners]
                 corners += [_vertex_index(stated, len(positions)) for stated in face]
                 counts.append(len(face))
                 owners.append(keys.setdefault(_Names(*now.values()), len(keys)))

@@ -240,7 +240,8 @@ def read_motion(
             f"{path}: frame {empty[0]} has an all-zero root, expected a tracked one (begin by "
             "first_frame)"
         )
-    still = np.all([(values[1:] == values[:-1]).all(axis=1) for values in motion.values()], axis=0)
+    same = [(values[1:] == values[:-1]).all(axis=1) for values in motion.values()]
+    still = np.all(same, axis=0)
     if still.any():
         frame = first + 1 + int(np.argmax(still))
         raise InputError(

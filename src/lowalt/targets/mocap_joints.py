@@ -151,7 +151,9 @@ def moved(nodes: np.ndarray, rate_hz: float, height_m: float | None, where: str)
             f"{where}: {len(nodes)} frames with places that are not finite, expected two good ones "
             "or more"
         )
-    reach = np.mean(nodes[:, NODES.index("head")] - nodes[:, NODES.index("ltibia")], axis=0)
+    head = nodes[:, NODES.index("head")]
+    shin = nodes[:, NODES.index("ltibia")]
+    reach = np.mean(head - shin, axis=0)
     axis = int(np.abs(reach).argmax())
     order = [(axis + 1) % 3, (axis + 2) % 3, axis]  # a proper rotation: z becomes the vertical
     nodes = nodes[..., order]
@@ -180,7 +182,8 @@ def _shortest(rest_bones: np.ndarray, bones: np.ndarray) -> np.ndarray:
     cosine = portable.dot(a, b)
     x, y, z = np.moveaxis(cross, -1, 0)
     zero = np.zeros_like(x)
-    skew = np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=-1).reshape(*x.shape, 3, 3)
+    entries = [zero, -z, y, z, zero, -x, -y, x, zero]
+    skew = np.stack(entries, axis=-1).reshape(*x.shape, 3, 3)
     factor = 1 / np.maximum(1 + cosine, 1e-6)
     return np.eye(3) + skew + factor[..., None, None] * portable.product(skew, skew)
 

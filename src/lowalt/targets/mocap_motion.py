@@ -251,7 +251,8 @@ def closed(motion: Motion, start: int, end: int, fade: int) -> tuple[Motion, np.
     weight = along**2 * (3 - 2 * along)
     after = slice(end, end + fade)
     looped = root[start:end].copy()
-    looped[:fade] = weight[:, None] * looped[:fade] + (1 - weight[:, None]) * root[after]
+    share = weight[:, None]
+    looped[:fade] = share * looped[:fade] + (1 - share) * root[after]
     weight = weight[:, None, None, None]
     turned[:fade] = nearest_rotations(weight * turned[:fade] + (1 - weight) * motion.turned[after])
     return Motion(looped, turned, motion.bones_m, motion.rate_hz), drift[:2] * motion.rate_hz

@@ -112,7 +112,8 @@ def from_surfaces(
     whole = merged(surfaces)
     owner = np.repeat(np.arange(len(surfaces)), [len(surface.vertices) for surface in surfaces])
     arrays = (whole.vertices, owner, whole.faces.astype(np.int64), offset_m, closed)
-    return dict(zip(ARRAYS, (*arrays, np.zeros((0, 2), np.int64), np.zeros(0)), strict=True))
+    no_limbs = (np.zeros((0, 2), np.int64), np.zeros(0))
+    return dict(zip(ARRAYS, arrays + no_limbs, strict=True))
 
 
 def from_bones(stature_m: float) -> dict[str, np.ndarray]:

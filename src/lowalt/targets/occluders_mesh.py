@@ -34,11 +34,13 @@ def _pool(mesh: Mesh, regions: list[dict]) -> Pool:
     for region in regions:
         while True:
             within = inside(corners.reshape(-1, 3), region).reshape(-1, 3)
-            long = (longest_edge(corners) > grain) & (within.any(axis=1) & ~within.all(axis=1))
-            if not long.any():
+            crossing = within.any(axis=1) & ~within.all(axis=1)
+            divided = (longest_edge(corners) > grain) & crossing
+            if not divided.any():
                 break
-            corners = np.concatenate([corners[~long], quartered(corners[long])])
-            component = np.concatenate([component[~long], np.tile(component[long], 4)])
+            kept = ~divided
+            corners = np.concatenate([corners[kept], quartered(corners[divided])])
+            component = np.concatenate([component[kept], np.tile(component[divided], 4)])
     return Pool(corners.mean(axis=1), corners.reshape(-1, 9), component, 0, 1.0)
 
 
@@ -58,13 +60,21 @@ def _triangles(record: dict, inputs: Path) -> dict[str, np.ndarray]:
     parts = record["parts"]
     regions = [part["region"] for part in parts.values() if "region" in part] + record["drop"]
     cutting = [region for region in regions if not region.get("whole")]
-    cut, _ = cut_parts(
-        record, inputs, frame, lambda mesh, is_body: _pool(mesh, cutting if is_body else []), _wheel
-    )
-    return {
-        name: (pool.points if "wheel" in parts[name] else pool.normals).reshape(-1, 3, 3) @ frame.T
-        for name, pool in cut.items()
-    }
+
+    def of_file(mesh: Mesh, is_body: bool) -> Pool:
+        """The pool of a mesh; regions cut through the body's alone."""
+        if is_body:
+            return _pool(mesh, cutting)
+        return _pool(mesh, [])
+
+    cut, _ = cut_parts(record, inputs, frame, of_file, _wheel)
+    result = {}
+    for name, pool in cut.items():
+        corners = pool.normals
+        if "wheel" in parts[name]:
+            corners = pool.points
+        result[name] = corners.reshape(-1, 3, 3) @ frame.T
+    return result
 
 
 def simplified(triangles: np.ndarray, most: int) -> Surface:

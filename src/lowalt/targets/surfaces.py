@@ -207,7 +207,8 @@ def hull(
         loops.append(np.stack([loop[:, 0], np.full(sides, y), height], 1))
     sections = np.array(loops)
     tips = portable.mean(sections[[0, -1]], 1)
-    tips[:, 1] += bow * np.array([-1, 1]) * np.sign(table[-1, 0] - table[0, 0])
+    sense = np.sign(table[-1, 0] - table[0, 0])
+    tips[:, 1] += bow * np.array([-1, 1]) * sense
     return loft(sections, tips)
 
 

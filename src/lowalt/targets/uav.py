@@ -62,8 +62,10 @@ def folding(record: dict, f: dict) -> list[Part]:
             rise = -0.3 * f["body_height"]
             leg = 0.35 * f["leg_height"]
         root = (0.3 * np.sign(x) * f["body_width"], root_y, rise)
-        shells.append(tube([root, (x, y, low)], [1.25 * arm, 0.9 * arm]))
-        shells.append(tube([(x, y, low), (x * 1.02, y, low - leg)], [0.7 * arm, 0.35 * arm], 8))
+        end = (x, y, low)
+        foot = (x * 1.02, y, low - leg)
+        shells.append(tube([root, end], [1.25 * arm, 0.9 * arm]))
+        shells.append(tube([end, foot], [0.7 * arm, 0.35 * arm], 8))
     return [Part("body", "body", tuple(shells)), *rotors(axles, top, f)]
 
 
@@ -195,7 +197,8 @@ def cabin(record: dict, f: dict) -> list[Part]:
     radius = f["motor_diameter"] / 2
     shells += [cylinder(radius, (x, y, low), (x, y, top)) for x, y in axles]
     for x, y in axles:
-        shells.append(tube([(0.12 * x, 0.2 * y, level), (x, y, level)], [1.5 * arm, arm]))
+        root = (0.12 * x, 0.2 * y, level)
+        shells.append(tube([root, (x, y, level)], [1.5 * arm, arm]))
     bottom = -0.5 * height - f["leg_height"]
     shells += skids(0.9 * half, 0.75 * length, -0.45 * height, bottom, 0.7 * arm)
     return [
@@ -228,7 +231,8 @@ def tanker(record: dict, f: dict) -> list[Part]:
     shells.append(hull(stations, 2.0))
     level = -0.2 * height
     end = 0.5 * length + f["lance_length"]
-    shells.append(tube([(0, 0.3 * length, level), (0, end, level)], [0.6 * arm, 0.35 * arm], 8))
+    lance = [(0, 0.3 * length, level), (0, end, level)]
+    shells.append(tube(lance, [0.6 * arm, 0.35 * arm], 8))
     bottom = -0.5 * height - f["leg_height"]
     shells += skids(0.75 * width, 1.3 * length, -0.3 * height, bottom, 0.5 * arm)
     return [

@@ -131,7 +131,8 @@ def wheel(diameter: float, tyre_width: float) -> tuple[Surface, ...]:
     radius = diameter / 2
     half = tyre_width / 2
     inner = 0.62 * radius
-    loop = superellipse((radius - inner) / 2, half, 3.5, 16) + np.array([(radius + inner) / 2, 0])
+    section = superellipse((radius - inner) / 2, half, 3.5, 16)
+    loop = section + np.array([(radius + inner) / 2, 0])
     # `ring` turns about z. The map takes z to x, so that one section of the tyre points straight
     # down.
     to_x = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])

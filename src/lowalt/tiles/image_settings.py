@@ -25,7 +25,8 @@ def colour_map(name: str) -> np.ndarray:
         raise InputError(
             f"images.colour_map is {name!r}, expected a matplotlib name such as 'viridis' or 'gray'"
         )
-    table = matplotlib.colormaps[name](np.linspace(0, 1, 256), bytes=True)[:, :3].copy()
+    colours = matplotlib.colormaps[name](np.linspace(0, 1, 256), bytes=True)
+    table = colours[:, :3].copy()
     table.setflags(write=False)
     return table
 

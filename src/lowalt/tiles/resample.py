@@ -151,5 +151,6 @@ def resize(images: np.ndarray, size: int) -> np.ndarray:
         return images.copy()
     stack = np.ascontiguousarray(images).reshape(-1, *images.shape[-2:])
     out = np.empty((len(stack), size, size), np.uint8)
-    _resize(stack, *row_taps(images.shape[-1], size), *column_taps(images.shape[-1], size), out)
+    before = images.shape[-1]
+    _resize(stack, *row_taps(before, size), *column_taps(before, size), out)
     return out.reshape(*images.shape[:-2], size, size)

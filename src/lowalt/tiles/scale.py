@@ -81,7 +81,8 @@ def lookup(scale: Scale, levels: int) -> Lookup:
     thresholds = scale.thresholds(levels).astype(np.float32)
     bits = thresholds.view(np.int32)
     top = int(np.float32(1).view(np.int32))
-    lowest = int(np.ldexp(np.float32(1), np.frexp(thresholds[0])[1] - 1).view(np.int32))
+    power_below = np.ldexp(np.float32(1), np.frexp(thresholds[0])[1] - 1)
+    lowest = int(power_below.view(np.int32))
     shift = 0
     keys = bits
     for mantissa in range(6, 24):

@@ -122,7 +122,8 @@ class Tiles:
                 f"{self.path}: data of {kind} parted by {ends.dtype}, expected bytes and whole "
                 "numbers"
             )
-        if not len(ends) or ends[0] < 0 or (np.diff(ends) < 0).any() or ends[-1] != size:
+        rising = len(ends) and ends[0] >= 0 and (np.diff(ends) >= 0).all()
+        if not rising or ends[-1] != size:
             raise InputError(
                 f"{self.path}: offsets.npy does not part data.npy's {size} bytes, the file is "
                 "damaged"

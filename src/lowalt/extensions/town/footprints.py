@@ -62,9 +62,11 @@ def _prism(polygon: Polygon, height_m: float, low_m: float) -> np.ndarray:
     triangles = shapely.constrained_delaunay_triangles(polygon).geoms
     corners_of = [np.asarray(orient(triangle).exterior.coords)[:3, :2] for triangle in triangles]
     roof = np.array(corners_of).reshape(-1, 3, 2)
-    roofs = [np.concatenate([roof, np.full((*roof.shape[:2], 1), height_m)], axis=2)]
+    level = (*roof.shape[:2], 1)
+    roofs = [np.concatenate([roof, np.full(level, height_m)], axis=2)]
     if low_m > 0.0:
-        roofs.append(np.concatenate([roof[:, ::-1], np.full((*roof.shape[:2], 1), low_m)], axis=2))
+        underside = roof[:, ::-1]
+        roofs.append(np.concatenate([underside, np.full(level, low_m)], axis=2))
     return np.concatenate([*walls, *roofs])
 
 
@@ -160,7 +162,9 @@ def middle_of(path: Path, height_m: float | None) -> tuple[float, float]:
             )
         bounds = np.array([footprint.outline.bounds for footprint in found])
         low_x, low_y, high_x, high_y = bounds.T
-    return float((low_x.min() + high_x.max()) / 2), float((low_y.min() + high_y.max()) / 2)
+    longitude = (low_x.min() + high_x.max()) / 2
+    latitude = (low_y.min() + high_y.max()) / 2
+    return float(longitude), float(latitude)
 
 
 def _local(origin: Sequence[float]) -> Transformer:

@@ -75,7 +75,8 @@ def refuse_place(settings: dict, network: Network) -> None:
     for station in network.stations:
         mast = np.asarray(station.position_m, float)
         masts[station.name] = mast
-        away[station.name] = float(np.linalg.norm((mast - np.clip(mast, low, high))[:2]))
+        nearest_point = np.clip(mast, low, high)
+        away[station.name] = float(np.linalg.norm((mast - nearest_point)[:2]))
     nearest = min(away, key=away.__getitem__)
     if away[nearest] > NEAR_M:
         raise InputError(

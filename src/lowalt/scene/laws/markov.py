@@ -91,7 +91,8 @@ def steps(drift: np.ndarray, noise: np.ndarray) -> Steps:
     count = len(drift)
     # Compute a piece of the step so short that its exponentials neither grow nor cancel, then
     # double it repeatedly.
-    halvings = max(0, int(np.frexp(portable.total(np.abs(drift), axis=0).max())[1]))
+    largest = portable.total(np.abs(drift), axis=0).max()
+    halvings = max(0, int(np.frexp(largest)[1]))
     block = np.zeros((2 * count, 2 * count))
     block[:count, :count] = -drift
     block[:count, count:] = noise[:, None] * noise

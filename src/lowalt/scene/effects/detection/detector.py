@@ -123,7 +123,9 @@ def windowed(settings: dict, cells: np.ndarray) -> np.ndarray:
     """
     if settings["range_window"] == "none":
         return cells
-    return (2 * cells - np.roll(cells, 1, axis=1) - np.roll(cells, -1, axis=1)) / math.sqrt(6)
+    before = np.roll(cells, 1, axis=1)
+    after = np.roll(cells, -1, axis=1)
+    return (2 * cells - before - after) / math.sqrt(6)
 
 
 def exceeds(settings: dict, power: np.ndarray) -> np.ndarray:

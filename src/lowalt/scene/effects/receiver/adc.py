@@ -37,7 +37,8 @@ def full_scale(samples: np.ndarray, backoff_db: float) -> float:
 
     It is a component's root mean square over the look, times the back-off.
     """
-    return float(np.sqrt(np.mean(samples.real**2 + samples.imag**2) / 2)) * 10 ** (backoff_db / 20)
+    power = np.mean(samples.real**2 + samples.imag**2)
+    return float(np.sqrt(power / 2)) * 10 ** (backoff_db / 20)
 
 
 def receive(

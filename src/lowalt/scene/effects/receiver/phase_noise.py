@@ -182,7 +182,8 @@ def phase(settings: dict, look: Look, rng: np.random.Generator) -> np.ndarray:
     lines = np.sqrt(slow_power) * rng.standard_normal((len(line_hz), 2)).view(np.complex128)[:, 0]
     # At the starts of symbols, lines 2 N apart have equal phases: each instant takes one transform
     # of 2 N lines.
-    folded = (lines[:, None] * turns).reshape(-1, 2 * symbols, turns.shape[1]).sum(axis=0)
+    turned = lines[:, None] * turns
+    folded = turned.reshape(-1, 2 * symbols, turns.shape[1]).sum(axis=0)
     at_nodes = fft.ifft(np.roll(folded, 1, axis=0), axis=0, norm="forward").real[:symbols]
     slow = matrix_product(at_nodes, blend)
     lags = matrix_product(fast_power[None], cosines)[0]
