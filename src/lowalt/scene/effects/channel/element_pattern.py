@@ -2,7 +2,8 @@
 
 It weights every echo on the way out and on the way back.
 
-Without this effect elements are isotropic. Reflected paths and the land have the gain in their own
+It falls by 12 (angle / width)^2 decibels in each plane, down to the level of the back lobe. Without
+this effect elements are isotropic. Reflected paths and the land have the gain in their own
 direction.
 """
 

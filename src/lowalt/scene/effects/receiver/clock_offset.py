@@ -2,7 +2,8 @@
 
 It is compared with the clock that made the symbols.
 
-Sample instants shrink within a symbol, and the window slips from symbol to symbol, so ranges drift.
+Sample instants shrink within a symbol, and the window slips from symbol to symbol, so ranges drift:
+by c n T_r e / 2 until symbol n, where e is the relative error of the clock.
 """
 
 import math
