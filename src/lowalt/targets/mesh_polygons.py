@@ -1,5 +1,6 @@
-"""Pieces of mesh files, and OBJ files as viewers show them: a polygon with a dent is cut by earcut,
-not as a fan.
+"""Pieces of mesh files, and OBJ files as viewers show them.
+
+A polygon with a dent is cut by earcut, not as a fan.
 
 Vertices, faces and the names of objects, groups and materials are read. trimesh counts negative
 indices from the file's end, cuts polygons as fans and splits by one kind of name at a time.
@@ -30,9 +31,7 @@ class Piece(Surface):
 
 
 FLAT = 1e-9
-"""A corner dents its polygon where its turn against the polygon's sense is more than this share of
-the area.
-"""
+"""Share of a polygon's area from which on a corner's turn against its sense is a dent."""
 
 
 def triangulated(
@@ -137,7 +136,8 @@ def read_obj(path: Path) -> list[Piece]:
                 if len(positions[-1]) < 3:
                     raise ValueError("fewer than three coordinates")
             elif word == "f":
-                face = [int(corner.split("/", 1)[0]) for corner in values.split("#", 1)[0].split()]
+                stated_corners = values.split("#", 1)[0].split()
+                face = [int(corner.split("/", 1)[0]) for corner in stated_corners]
                 corners += [_vertex_index(stated, len(positions)) for stated in face]
                 counts.append(len(face))
                 owners.append(keys.setdefault(_Names(*now.values()), len(keys)))

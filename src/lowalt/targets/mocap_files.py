@@ -69,7 +69,7 @@ def _blocks(lines: list[list[str]]) -> dict[str, dict[str, list[str]]]:
 
 def _refuse_other_nodes(path: Path, hierarchy: list[list[str]]) -> None:
     """Raise InputError where the lines `parent child child ...` are not those of the 31 nodes."""
-    parents = {}
+    parents: dict[str, str] = {}
     for parent, *children in hierarchy:
         parents |= dict.fromkeys(children, parent)
     if parents != LIMBS:
@@ -240,7 +240,8 @@ def read_motion(
             f"{path}: frame {empty[0]} has an all-zero root, expected a tracked one (begin by "
             "first_frame)"
         )
-    still = np.all([(values[1:] == values[:-1]).all(axis=1) for values in motion.values()], axis=0)
+    same = [(values[1:] == values[:-1]).all(axis=1) for values in motion.values()]
+    still = np.all(same, axis=0)
     if still.any():
         frame = first + 1 + int(np.argmax(still))
         raise InputError(

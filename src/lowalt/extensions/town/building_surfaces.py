@@ -1,4 +1,4 @@
-"""The triangles of a file of buildings as its reader finds them, with the names of their materials."""
+"""The triangles of a file of buildings as its reader finds them, and their materials' names."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
@@ -56,8 +56,9 @@ def joined(
 
 
 def mesh_parts(path: Path, unit: str, up: str) -> tuple[list[tuple[np.ndarray, str]], list[str]]:
-    """Return the corners (F, 3, 3) m, z up, and the material's name of each piece of a mesh file,
-    "" for none that is known, and the names of pieces that are called like no material.
+    """Return the pieces of a mesh file, and the names of those that are called like no material.
+
+    A piece is its corners (F, 3, 3) m, z up, and its material's name, "" for none that is known.
 
     Raises: InputError as the readers of `targets.mesh_files`.
     """

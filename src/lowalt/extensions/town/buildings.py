@@ -1,5 +1,6 @@
-"""Buildings from a file: a mesh, footprints with heights (GeoJSON), or a Mitsuba scene; in metres,
-z up.
+"""Buildings from a file: a mesh, footprints with heights (GeoJSON), or a Mitsuba scene.
+
+They are in metres, z up.
 """
 
 from functools import lru_cache
@@ -23,8 +24,9 @@ LOWEST_M = -1.0
 TALLEST_M = (2.0, 900.0)
 SMALLEST_M = 3.0
 LARGEST_M = 20_000.0
-"""Heights of the tallest building, and least and largest extents of a town, outside of which the
-unit is wrong.
+"""Heights of the tallest building, and least and largest extents of a town.
+
+Outside of these the unit is wrong.
 """
 
 SMALLEST_M2 = 5e-7
@@ -35,8 +37,9 @@ KEYS = ("height_m", "unit", "up", "material", "ground", "left_out")
 
 
 class Buildings(NamedTuple):
-    """A town that was read: its paths' `town`, its triangles' corners (F, 3, 3) m, and what was
-    merged or dropped.
+    """A town that was read.
+
+    town: of its paths; corners: (F, 3, 3) m, of its triangles; facts: what was merged or dropped.
     """
 
     town: Town
@@ -45,7 +48,7 @@ class Buildings(NamedTuple):
 
 
 def _surfaces(path: Path, settings: dict) -> Surfaces:
-    """The surfaces of a file by its ending, moved so that the origin of the settings is (0, 0, 0)."""
+    """The surfaces of a file by its ending, moved so that the settings' origin is (0, 0, 0)."""
     kind = path.suffix.lower()
     origin = settings["origin"]
     if kind in (".geojson", ".json"):
@@ -71,8 +74,9 @@ def _surfaces(path: Path, settings: dict) -> Surfaces:
 
 
 def _cleaned(path: Path, found: Surfaces) -> tuple[np.ndarray, np.ndarray, dict[str, int]]:
-    """Corners (F, 3, 3) and materials (F,) without the ground, triangles without an area and
-    repeated ones.
+    """Return corners (F, 3, 3) and materials (F,) of the buildings alone.
+
+    The ground, triangles without an area and repeated ones are left out.
 
     Raises: InputError for no triangle, too many, numbers that are not finite, or a town of the
     wrong size.
@@ -129,8 +133,9 @@ def files_of(buildings: str | Path) -> list[str]:
 
 
 def read(settings: dict) -> Buildings:
-    """Return the buildings of the file that the settings of the effect `town` name; the last few
-    are kept.
+    """Return the buildings of the file that the settings of the effect `town` name.
+
+    The last few are kept.
 
     Raises: InputError naming the file and what is wrong with it, or a material that is not known.
     """

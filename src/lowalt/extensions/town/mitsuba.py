@@ -34,8 +34,9 @@ def _numbers(element: Element, size: int, default: float) -> np.ndarray:
 
 
 def _pose(shape: Element) -> np.ndarray:
-    """The pose (4, 4) of a shape in the scene; each step of its transform acts after those before
-    it.
+    """The pose (4, 4) of a shape in the scene.
+
+    Each step of its transform acts after those before it.
     """
     result = np.eye(4)
     for transform in shape.findall("transform"):
@@ -55,7 +56,8 @@ def _pose(shape: Element) -> np.ndarray:
                 matrix = _numbers(step, 16, 0.0).reshape(4, 4)
             else:
                 raise InputError(
-                    f"a shape is placed by <{step.tag}>, expected translate, scale, rotate or matrix"
+                    f"a shape is placed by <{step.tag}>, expected translate, scale, rotate or "
+                    "matrix"
                 )
             result = matrix @ result
     return result
@@ -68,8 +70,9 @@ def _names(bsdf: Element) -> list[str]:
 
 
 def _material(shape: Element, scene: dict[str, list[str]]) -> tuple[str, str]:
-    """The material of a shape, "" for none that is known, and the name of one that is not known, ""
-    for none.
+    """The material of a shape, and the name of one that is not known.
+
+    Either is "" for none.
 
     scene: the names of the materials of the scene by their identifiers.
     """
@@ -85,8 +88,9 @@ def _material(shape: Element, scene: dict[str, list[str]]) -> tuple[str, str]:
 
 
 def _file_of(shape: Element, path: Path) -> Path:
-    """The mesh file of a shape. Raises: InputError where it is not in the folder of the scene, or
-    not there.
+    """The mesh file of a shape.
+
+    Raises: InputError where it is not in the folder of the scene, or not there.
     """
     name = ""
     for text in shape.findall("string"):
@@ -135,7 +139,7 @@ def read_mitsuba(path: Path, unit: str) -> Surfaces:
         )
     materials = {bsdf.get("id", ""): _names(bsdf) for bsdf in root.findall("bsdf")}
     walls = []
-    left_out = {}
+    left_out: dict[str, int] = {}
     unknown = []
     for shape in shapes:
         if shape.get("type") not in KINDS:
