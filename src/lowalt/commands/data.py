@@ -66,10 +66,10 @@ def verified(options: argparse.Namespace) -> Answer:
 
 def remade(options: argparse.Namespace) -> Answer:
     """Make samples again and compare them. Raises: InputError for a key that the data set lacks."""
-    from lowalt.shards.remake import opened, place_of
+    from lowalt.shards.remake import number_of, opened
 
     remaker = opened(options.index, options.clouds, options.occluders)
     lines = []
     for key in options.sample:
-        lines += remaker.faults(place_of(remaker.shards, key))
+        lines += remaker.faults(number_of(remaker.shards, key))
     return _checked(lines, f"{len(options.sample)} samples made again, equal in every byte")
