@@ -29,12 +29,12 @@ def _views(arguments: list[str]) -> None:
     options = line.parse_args(arguments)
     if (options.reduced is None) != (options.motion is None):
         raise InputError("expected both --reduced and --motion, or neither")
-    size, *levels = pick(options.settings, "size", *(["snr_db"] if options.reduced else []))
-    source = (
-        Reduced(Path(options.reduced), Path(options.motion), tuple(map(float, levels[0])))
-        if levels
-        else None
-    )
+    source = None
+    if options.reduced:
+        size, snrs_db = pick(options.settings, "size", "snr_db")
+        source = Reduced(Path(options.reduced), Path(options.motion), tuple(map(float, snrs_db)))
+    else:
+        (size,) = pick(options.settings, "size")
     count = cache_shard(options.index, options.shard, size, options.out, source)
     print(f"{options.out}: {count} samples", file=sys.stderr)
 
@@ -91,8 +91,10 @@ def _source(options: Namespace):
 
 
 def _train(arguments: list[str]) -> None:
-    """Train one scheme in one protocol. Settings: scheme, seed, size, colour_map, network,
-    training, augmentation, classes."""
+    """Train one scheme in one protocol.
+
+    Settings: scheme, seed, size, colour_map, network, training, augmentation, classes.
+    """
     from lowalt.recognition.runs import train
 
     line = parser("lowalt.recognition train", _train.__doc__)
@@ -114,8 +116,9 @@ def _train(arguments: list[str]) -> None:
 
 
 def _evaluate(arguments: list[str]) -> None:
-    """Predict all validation and test samples of a model's protocol. Settings: batch, threads,
-    precision, mirror.
+    """Predict all validation and test samples of a model's protocol.
+
+    Settings: batch, threads, precision, mirror.
     """
     from lowalt.recognition.runs import evaluate, load
 

@@ -22,9 +22,9 @@ class Interval(NamedTuple):
 def bootstrap(
     clusters: np.ndarray, values: np.ndarray, generator: np.random.Generator, repeats: int = 4000
 ) -> Interval:
-    """Mean of `values` (samples,) with the percentile interval from resampling whole clusters
-    (samples,).
+    """Mean of `values` (samples,) with the percentile interval from resampling whole clusters.
 
+    clusters: (samples,).
     Source: Efron and Tibshirani, An Introduction to the Bootstrap, 1993, ch. 13; clusters as in the
     module's docstring.
     """
@@ -42,8 +42,9 @@ def bootstrap(
 def model_shares(
     motion: np.ndarray, correct: list[np.ndarray]
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return for each motion model its first sample (models,), its number of samples (models,) and
-    its share of correct samples by seed (seeds, models).
+    """Return the first sample, number of samples and share of correct ones of each motion model.
+
+    The first two are (models,); the share is (seeds, models).
 
     motion (samples,): name of the motion model; correct: (samples,) of every training seed.
     """
@@ -67,8 +68,7 @@ def _seed_weights(seeds: int, repeats: int, generator: np.random.Generator) -> n
 
 
 def _stretch(count: int, freedom: int) -> float:
-    """Return the factor by which an interval of a mean from resampling `count` values is too
-    narrow.
+    """Return by what factor an interval from resampling `count` values is too narrow.
 
     Resampling n values gives (n - 1) / n of the variance of their mean. A spread that is estimated
     with `freedom` degrees of freedom needs Student's quantile instead of the normal one. Source:
@@ -85,8 +85,7 @@ def _stretch(count: int, freedom: int) -> float:
 def _subtype_weights(
     subtypes: np.ndarray, repeats: int, generator: np.random.Generator
 ) -> np.ndarray:
-    """Weight of each motion model, (repeats, models), when whole subtypes are drawn with all their
-    models.
+    """Weight of each motion model, (repeats, models), when whole subtypes are drawn.
 
     Models are not resampled within a drawn subtype, because the spread between subtypes includes
     theirs. Deviations are stretched for few subtypes, so a weight may be slightly negative. Source:
@@ -132,8 +131,9 @@ def strict_difference(
     generator: np.random.Generator,
     repeats: int = 4000,
 ) -> Interval:
-    """Mean of first - second over seeds and samples; its 95 % interval resamples seeds, subtypes
-    and models.
+    """Mean of first - second over seeds and samples, with its 95 % interval.
+
+    The interval resamples seeds, subtypes and models.
 
     first, second (seeds, models): share of correct samples of each motion model, a row per training
     seed; the seeds of both are drawn independently, because equal seeds give two schemes different

@@ -1,5 +1,4 @@
-"""A backbone of the user's own: a function of a Python file, which the configuration names as
-FILE.py:FUNCTION.
+"""A backbone of the user's own: a function of a Python file, named as FILE.py:FUNCTION.
 
 The function takes the pixels per side of an image and returns a torch module, RGB images (B, 3,
 size, size) float32 to features (B, features). The file runs with the rights of the user, so it is

@@ -1,6 +1,4 @@
-"""The source of samples that training and evaluation use: caches of views, shards, or simulation on
-access.
-"""
+"""Where training and evaluation read samples: caches of views, shards, or simulation on access."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -16,8 +14,7 @@ from lowalt.shards import ShardSet
 
 @dataclass(frozen=True)
 class Source:
-    """Exactly one of three sources: caches of views, the index of shards, or a function that
-    simulates samples.
+    """One of three sources: caches of views, the index of shards, or a function that simulates.
 
     made: the function, with the arguments of `samples`. The caller imports it, so that reading
     stored samples does not import the simulation.
@@ -29,9 +26,7 @@ class Source:
 
     @classmethod
     def of_run(cls, index: Path, size: int) -> "Source":
-        """Return a run's caches of views of this size if every shard has one, else its shards
-        (index).
-        """
+        """Return a run's caches of views of this size if every shard has one, else its index."""
         caches = sorted(index.parents[1].glob(f"views/{size}/*.npz"))
         shards = {Path(shard["name"]).stem for shard in ShardSet(index).index["shards"]}
         return cls(views=caches) if {path.stem for path in caches} == shards else cls(index=index)

@@ -85,9 +85,7 @@ def first_models(facts: Facts, share: float) -> np.ndarray:
 
 
 def statement(facts: Facts) -> list[list]:
-    """Return what a trained model states of its samples: [subtype, fold, number of motion models],
-    sorted.
-    """
+    """Return what a model states of its samples: [subtype, fold, number of models], sorted."""
     motion = facts.motion
     found = []
     for subtype in np.unique(facts.subtype).tolist():
@@ -99,9 +97,7 @@ def statement(facts: Facts) -> list[list]:
 
 
 def fingerprint(facts: Facts, *content: bytes | memoryview) -> str:
-    """Return the SHA-256 of keys, labels, subtypes, models and SNRs of some samples, and of
-    `content`.
-    """
+    """Return the SHA-256 of samples' keys, labels, subtypes, models and SNRs, and of `content`."""
     hasher = hashlib.sha256()
     for name in ("key", "label", "subtype", "model", "snr_db"):
         values = np.ascontiguousarray(getattr(facts, name))
@@ -113,8 +109,7 @@ def fingerprint(facts: Facts, *content: bytes | memoryview) -> str:
 
 
 class Samples:
-    """A source of samples: `facts` of each, `size` of its images, `views` of some, and `sha256` of
-    all.
+    """A source of samples: their `facts`, `size` of images, `views` and the `sha256` of all.
 
     A training calls `changed`, an evaluation `inputs`. A source whose network takes more than
     images overrides both.
@@ -132,9 +127,7 @@ class Samples:
         raise NotImplementedError
 
     def inputs(self, numbers: np.ndarray) -> Any:
-        """Return what the network takes of the samples `numbers`: an array, or several in a named
-        tuple.
-        """
+        """Return what the network takes of the samples `numbers`: an array, or several by name."""
         return self.views(numbers)
 
     def changed(

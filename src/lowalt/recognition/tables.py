@@ -2,30 +2,29 @@
 
 The first columns of each file are `protocol, scheme`:
     accuracy.csv     snr_db ("avg": mean over the SNRs), accuracy_percent, macro F1 in percent with
-    its 95 % interval,
-                     samples, hardware; averages over several seeds; seeds is their number,
-                     spread_points their standard deviation (empty for one)
+                     its 95 % interval, samples, hardware; averages over several seeds; seeds is
+                     their number, spread_points their standard deviation (empty for one)
     seen_test.csv    the same for the seen subtypes' test fold in the unseen protocol
     seeds.csv        one row per training: accuracy_percent on average over the SNRs, its network,
-    cost and hardware confusion.csv    category, predicted, samples
-    confusion_by_snr.csv  snr_db, category, predicted, samples
+                     cost and hardware
+    confusion.csv    category, predicted, samples
+    confusion_by_snr.csv
+                     snr_db, category, predicted, samples
     subtypes.csv     category, subtype, accuracy_percent, samples
     ranges.csv       band of the distance to the nearest station used, accuracy_percent, samples
     aspects.csv      band of the aspect seen from that station, accuracy_percent, samples
     alarms.csv       required detection of the first class, its threshold (set on validation), and
-    on test the
-                     detection and the false alarms of the other classes with 95 % intervals. Each
-                     model has its own threshold; values are means over the seeds. "not measurable"
-                     where fewer than ten validation samples would be below the threshold
+                     on test the detection and the false alarms of the other classes with 95 %
+                     intervals. Each model has its own threshold; values are means over the seeds.
+                     "not measurable" where fewer than ten validation samples would be below the
+                     threshold
     calibration.csv  calibration error, Brier score, cross entropy on test, means over the seeds
-    comparisons.csv  over: the scheme compared with; difference with its 95 % interval, and what the
-    interval resamples:
-                     training seeds (where there are several), subtypes (unseen protocol), motion
-                     models
+    comparisons.csv  over: the scheme compared with; difference with its 95 % interval, and what
+                     the interval resamples: training seeds (where there are several), subtypes
+                     (unseen protocol), motion models
     orderings.csv    the paper's claims: its own difference, ours, and whether its ordering holds
-    here (the interval
-                     lies above zero), is reversed (below), undecided (zero inside) or not ranked
-                     (fewer than 3 seeds)
+                     here (the interval lies above zero), is reversed (below), undecided (zero
+                     inside) or not ranked (fewer than 3 seeds)
 """
 
 from collections.abc import Callable, Iterable
@@ -72,8 +71,9 @@ def snr_text(snr_db: float) -> str:
 
 
 def accuracy_rows(runs: list[Evaluated], part: str, seed: int) -> Iterable[list]:
-    """Yield rows [snr_db, accuracy_percent, *F1, samples, hardware, seeds, spread_points] of one
-    scheme's runs.
+    """Yield the rows of accuracy.csv of one scheme's runs.
+
+    Columns: snr_db, accuracy_percent, *F1, samples, hardware, seeds, spread_points.
 
     Values are means over the runs, one per training seed; seed: of the bootstrap. Intervals of
     macro F1 resample whole subtypes if these are held out from training.
@@ -108,13 +108,20 @@ def seed_rows(runs: list[Evaluated]) -> Iterable[list]:
         by_snr = statistics.accuracy_by(run.test.snr_db, run.test.correct)
         shares = [share for share, _ in by_snr.values()]
         known = [run.about.get(name, "") for name in TRAINING]
-        took = [f"{value:.6g}" if isinstance(value, float) else value for value in known]
-        yield [run.seed, percent(np.mean(shares)), *took, run.hardware]
+        yield [run.seed, percent(np.mean(shares)), *map(_six_digits, known), run.hardware]
+
+
+def _six_digits(value: object) -> object:
+    """A float as text with six digits, anything else as it is."""
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    return value
 
 
 def confusion_rows(runs: list[Evaluated], snr_db: float | None = None) -> Iterable[list]:
-    """Yield rows [category, predicted, samples], summed over the seeds, at one SNR (dB) or over
-    all.
+    """Yield rows [category, predicted, samples], summed over the seeds.
+
+    snr_db: the SNR (dB) to count; None counts all.
     """
     classes = runs[0].classes
     counts = 0
@@ -141,25 +148,30 @@ def subtype_rows(runs: list[Evaluated]) -> Iterable[list]:
     }
     correct = np.mean([run.test.correct for run in runs], axis=0)
     table = statistics.accuracy_by(test.subtype, correct)
-    for name in sorted(
-        table, key=lambda name: (classes.index(category[name]), table[name][0], name)
-    ):
-        yield [category[name], name, percent(table[name][0]), table[name][1]]
+
+    def worst_first(name: str) -> tuple:
+        """By class, then by accuracy."""
+        share, _ = table[name]
+        return classes.index(category[name]), share, name
+
+    for name in sorted(table, key=worst_first):
+        share, count = table[name]
+        yield [category[name], name, percent(share), count]
 
 
 def band_rows(
     runs: list[Evaluated], values: Callable[[Predictions], np.ndarray], width: float
 ) -> Iterable[list]:
-    """Yield rows [from, to, accuracy_percent, samples] for bands of a value; samples without the
-    value are omitted.
+    """Yield rows [from, to, accuracy_percent, samples] for bands of a value.
+
+    Samples without the value are omitted.
     """
     test = runs[0].test
     numbers = values(test)
     known = ~np.isnan(numbers)
     correct = np.mean([run.test.correct for run in runs], axis=0)
-    for band, (share, count) in statistics.accuracy_by(
-        np.floor(numbers[known] / width), correct[known]
-    ).items():
+    bands = statistics.accuracy_by(np.floor(numbers[known] / width), correct[known])
+    for band, (share, count) in bands.items():
         yield [f"{band * width:g}", f"{(band + 1) * width:g}", percent(share), count]
 
 
@@ -174,8 +186,9 @@ def _alarm_part(predictions: Predictions) -> statistics.AlarmPart:
 
 
 def alarm_rows(runs: list[Evaluated], seed: int) -> Iterable[list]:
-    """Yield rows [asked, threshold, rate, low, high, ...]: detection of the first class, then false
-    alarms of others.
+    """Yield rows [asked, threshold, rate, low, high, ...] of detection and false alarms.
+
+    Detection is that of the first class; the false alarms of the others follow.
 
     In percent, with 95 % intervals; thresholds come from validation samples. "not measurable" where
     there are too few validation samples to set a threshold.
@@ -183,11 +196,9 @@ def alarm_rows(runs: list[Evaluated], seed: int) -> Iterable[list]:
     classes = len(runs[0].classes)
     validations = [_alarm_part(run.part("validation")) for run in runs]
     tests = [_alarm_part(run.test) for run in runs]
-    for asked in (
-        DETECTIONS
-        if all((part.labels == statistics.LOOKED_FOR).any() for part in validations)
-        else ()
-    ):
+    if not all((part.labels == statistics.LOOKED_FOR).any() for part in validations):
+        return
+    for asked in DETECTIONS:
         if not statistics.measurable(validations[0].labels, asked):
             yield [percent(asked), *["not measurable"] * (1 + 3 * classes)]
             continue
