@@ -43,6 +43,16 @@ from lowalt.recognition.predictions import Predictions
 
 F1 = ("macro_f1_percent", "macro_f1_low", "macro_f1_high")
 """Columns of accuracy.csv with macro F1 and the bounds of its 95 % interval."""
+ACCURACY = (
+    "snr_db",
+    "accuracy_percent",
+    *F1,
+    "samples",
+    "hardware",
+    "seeds",
+    "spread_points",
+)
+"""Columns of accuracy.csv behind protocol and scheme."""
 TRAINING = (
     "backbone",
     "weights",
@@ -73,9 +83,7 @@ def snr_text(snr_db: float) -> str:
 def accuracy_rows(runs: list[Evaluated], part: str, seed: int) -> Iterable[list]:
     """Yield the rows of accuracy.csv of one scheme's runs.
 
-    Columns: snr_db, accuracy_percent, *F1, samples, hardware, seeds, spread_points.
-
-    Values are means over the runs, one per training seed; seed: of the bootstrap. Intervals of
+    The columns are ACCURACY. Values are means over the runs, one per training seed; seed: of the bootstrap. Intervals of
     macro F1 resample whole subtypes if these are held out from training.
     """
     parts = [run.part(part) for run in runs]
@@ -292,14 +300,13 @@ def write(
         group.append(run)
     keys = sorted(groups, key=lambda key: (key[0], order.index(key[1])))
     share = ["accuracy_percent", "samples"]
-    measured = ["snr_db", "accuracy_percent", *F1, "samples", "hardware", "seeds", "spread_points"]
     bands = ["from", "to", *share]
     rates = ("detected", *map(word, _one_set(runs)[1:]))
     alarm = ["asked_percent", "threshold"]
     for rate in rates:
         alarm += [f"{rate}_percent", f"{rate}_low", f"{rate}_high"]
     tables = {
-        "accuracy": (measured, lambda group: accuracy_rows(group, "test", seed)),
+        "accuracy": (list(ACCURACY), lambda group: accuracy_rows(group, "test", seed)),
         "seeds": (["seed", "accuracy_percent", *TRAINING, "hardware"], seed_rows),
         "confusion": (["category", "predicted", "samples"], confusion_rows),
         "confusion_by_snr": (["snr_db", "category", "predicted", "samples"], confusion_by_snr_rows),
@@ -320,7 +327,7 @@ def write(
         if protocol == "unseen" and len(group[0].part("seen_test")):
             rows = accuracy_rows(group, "seen_test", seed)
             seen += [[protocol, scheme, *row] for row in rows]
-    _write(Path(folder) / "seen_test.csv", measured, seen)
+    _write(Path(folder) / "seen_test.csv", list(ACCURACY), seen)
     compared = _compared(groups, seed)
     columns = ["over", "claim", "resampled", "seeds", "difference_points", "low", "high"]
     _write(Path(folder) / "comparisons.csv", columns, compared)

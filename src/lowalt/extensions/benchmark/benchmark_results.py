@@ -7,9 +7,7 @@ from lowalt.report.reported_run import ReportedRun
 
 
 def values(run: ReportedRun) -> dict | None:
-    """Return the benchmark's name, its tables as texts and the hardware; None where the data are no
-    benchmark's.
-    """
+    """Return the benchmark's name, its tables as texts and the hardware; None for other data."""
     if "benchmark" not in run.inputs:
         return None
     rows = run.inputs.table("benchmark", *COLUMNS)

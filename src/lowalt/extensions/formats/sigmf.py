@@ -1,5 +1,6 @@
-"""Signals as SigMF recordings: one per station, all samples one after the other, each with an
-annotation of its own.
+"""Signals as SigMF recordings: one per station, an annotation for each sample.
+
+The samples stand one after the other.
 
 `python -m lowalt.extensions.formats.sigmf --index INDEX --out FOLDER`. The sample rate is the
 symbol
@@ -73,9 +74,9 @@ def metadata(shards: ShardSet, network: Network, place: int, digest: str) -> dic
 
 
 def export(shards: ShardSet, folder: str | Path) -> list[Path]:
-    """Write {station}.sigmf-data and {station}.sigmf-meta of each station into `folder`; return the
-    metadata's paths.
+    """Write {station}.sigmf-data and {station}.sigmf-meta of each station into `folder`.
 
+    Return the paths of the metadata.
     Raises: InputError where the shards hold images, or naming a damaged sample.
     """
     if shards.kind == "image":
