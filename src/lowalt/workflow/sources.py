@@ -1,5 +1,4 @@
-"""The source files that a module uses: its transitive imports within the package, found by static
-analysis.
+"""The source files that a module uses: its transitive imports, found by static analysis.
 
 The workflow declares them as inputs of each stage, so editing a module re-runs the stages that use
 it.
@@ -31,9 +30,9 @@ def _file(module: str) -> Path | None:
     """File of a module of the package or of an extension, None where there is none."""
     if module.split(".")[0] != PACKAGE.name:
         found = importlib.util.find_spec(module)
-        return (
-            Path(found.origin) if found and found.origin and found.origin.endswith(".py") else None
-        )
+        if found is None or not (found.origin or "").endswith(".py"):
+            return None
+        return Path(found.origin)
     base = ROOT.joinpath(*module.split("."))
     for path in (base / "__init__.py", base.with_suffix(".py")):
         if path.is_file():
@@ -42,8 +41,9 @@ def _file(module: str) -> Path | None:
 
 
 def _statements(body: list[ast.stmt]) -> Iterator[ast.stmt]:
-    """Yield every statement of a body and of the blocks inside it. Expressions, which are most
-    nodes, contain none.
+    """Yield every statement of a body and of the blocks inside it.
+
+    Expressions, which are most nodes, contain none.
     """
     for statement in body:
         yield statement
@@ -55,16 +55,16 @@ def _statements(body: list[ast.stmt]) -> Iterator[ast.stmt]:
 
 @functools.cache
 def _imports(path: Path, package: str = PACKAGE.name) -> tuple[str, ...]:
-    """Modules of lowalt, and of the file's own `package`, that a file imports: anywhere in the
-    file, but in a `__main__` only at top level.
+    """Modules of lowalt, and of the file's own `package`, that a file imports.
 
-    Imports within a function of a `__main__` belong to one subcommand; the caller names them. Those
-    within functions of the package's `__init__` serve users' attribute access, which no stage uses.
+    They may stand anywhere in the file, but in a `__main__` only at top level. Imports within a
+    function of a `__main__` belong to one subcommand; the caller names them. Those within functions
+    of the package's `__init__` serve users' attribute access, which no stage uses.
     """
     tree = ast.parse(path.read_bytes(), str(path))
     modules = []
-    deferred = path.name == "__main__.py" or path == PACKAGE / "__init__.py"
-    for node in tree.body if deferred else _statements(tree.body):
+    top_level_only = path.name == "__main__.py" or path == PACKAGE / "__init__.py"
+    for node in tree.body if top_level_only else _statements(tree.body):
         if isinstance(node, ast.Import):
             modules += [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom) and node.module:
@@ -124,14 +124,13 @@ def file_of(module: str) -> Path:
 
 
 def near(path: Path) -> str:
-    """Return a path relative to the working directory if it is below it, so that a checkout can be
-    moved.
-    """
-    here = Path.cwd()
-    return str(path.relative_to(here) if path.is_relative_to(here) else path)
+    """Return a path relative to the working directory if it is below, so a checkout can move."""
+    if path.is_relative_to(Path.cwd()):
+        return str(path.relative_to(Path.cwd()))
+    return str(path)
 
 
 @functools.cache
 def code(*modules: str, spectra: tuple[str, ...] = ()) -> tuple[str, ...]:
-    """Return `sources` of these modules as inputs of a rule: editing one re-runs the rule's jobs."""
+    """Return `sources` of these modules as inputs of a rule, whose jobs an edit re-runs."""
     return tuple(near(path) for path in sources(*modules, spectra=spectra))
