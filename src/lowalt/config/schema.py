@@ -74,7 +74,7 @@ COUNTS = ("minProperties", "maxProperties")
 """Rules of a schema on the number of a block's keys."""
 
 
-def plain(value: object) -> object:
+def plain(value: Any) -> Any:
     """Return checked settings with infinities as the text "inf", which JSON has not as a number."""
     if isinstance(value, dict):
         return {key: plain(item) for key, item in value.items()}

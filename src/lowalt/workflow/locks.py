@@ -133,17 +133,19 @@ def holders(locks: Path, living: bool = False) -> list[str]:
     for number in numbers(locks):
         path = record(locks, number)
         owner = Owner.read(path)
-        if owner and owner.here and held(path):
+        if owner is not None and owner.here and held(path):
             lines.append(f"process {owner.pid} of {owner.host} is running; wait for it or end it")
-        elif not living and owner is None:
+        elif living:
+            continue
+        elif owner is None:
             lines.append(
                 f"{locks / f'{number}.output.lock'}: no record of its owner in {path.name}"
             )
-        elif not living and not owner.here:
+        elif not owner.here:
             lines.append(
                 f"process {owner.pid} of host {owner.host}, which cannot be seen from here"
             )
-        elif not living:
+        else:
             lines.append(
                 f"process {owner.pid} of {owner.host} has died; the next run takes its lock over"
             )

@@ -200,7 +200,7 @@ def _slower(executor: Any, asked_s: float | None) -> None:
 
 def quiet_logs_on_a_full_disk() -> None:
     """Let log files be silent where their disk is full."""
-    logging.FileHandler.handleError = _quiet  # type: ignore[method-assign]
+    logging.FileHandler.handleError = _quiet  # type: ignore[method-assign, assignment]
 
 
 def _quiet(file: logging.FileHandler, record: logging.LogRecord) -> None:

@@ -30,9 +30,10 @@ def _file(module: str) -> Path | None:
     """File of a module of the package or of an extension, None where there is none."""
     if module.split(".")[0] != PACKAGE.name:
         found = importlib.util.find_spec(module)
-        if found is None or not (found.origin or "").endswith(".py"):
+        origin = found.origin if found else None
+        if origin is None or not origin.endswith(".py"):
             return None
-        return Path(found.origin)
+        return Path(origin)
     base = ROOT.joinpath(*module.split("."))
     for path in (base / "__init__.py", base.with_suffix(".py")):
         if path.is_file():
@@ -83,8 +84,8 @@ def sources(*modules: str, spectra: tuple[str, ...] = ()) -> tuple[Path, ...]:
     modules the catalogue of spectra imports by name.
     Raises: ModuleNotFoundError where there is no such module.
     """
-    todo = []
-    seen = set()
+    todo: list[str] = []
+    seen: set[str] = set()
     paths = [Path(name) for name in modules if name.endswith(".py")]
     for path in paths:
         todo += _imports(path)
@@ -105,14 +106,14 @@ def sources(*modules: str, spectra: tuple[str, ...] = ()) -> tuple[Path, ...]:
         parent = name.rpartition(".")[0]
         if parent and package == PACKAGE.name:
             todo.append(parent)
-        todo += _imports(_file(name), package)
+        todo += _imports(file_of(name), package)
         if name == CATALOGUE:
             todo += [module_name(spectrum) for spectrum in spectra]
         if name == EXTENSIONS:
             todo.append(DECLARATION)
         if name == MESHES:
             todo += offered("meshes").values()
-    return tuple(sorted({*map(_file, seen), *(path.absolute() for path in paths)}))
+    return tuple(sorted({*map(file_of, seen), *(path.absolute() for path in paths)}))
 
 
 def file_of(module: str) -> Path:
