@@ -1,6 +1,4 @@
-"""Section: what the run is, its accuracies beside the paper's in one sentence each, and a tile of
-each category.
-"""
+"""Section: what the run is, its accuracies beside the paper's, and a tile of each category."""
 
 from lowalt.files.csv_tables import read_csv
 from lowalt.machine.hardware import describe
@@ -16,8 +14,9 @@ TILES = 4
 
 
 def verdict(paper: float | None, classes: int, seeds: int) -> str:
-    """Return sentences that help to judge an average accuracy (percent); paper: the published one,
-    or None.
+    """Return sentences that help to judge an average accuracy (percent).
+
+    paper: the published one, or None.
     """
     words = [f"Chance level is {100 / classes:.0f} %."]
     if paper is not None:
@@ -33,9 +32,7 @@ def verdict(paper: float | None, classes: int, seeds: int) -> str:
 def accuracies(
     rows: list[dict[str, str]], published: list[dict[str, str]], classes: int
 ) -> list[dict]:
-    """Return one entry per protocol: scheme of highest average, its accuracy, interval of macro F1,
-    and a verdict.
-    """
+    """Return one entry per protocol on its best scheme: accuracy, macro F1, a verdict."""
     ours = by_scheme(rows)
     paper = by_scheme(published)
     intervals = macro_f1(rows)
@@ -59,9 +56,9 @@ def accuracies(
 
 def values(run: ReportedRun) -> dict:
     """Return the run's size, its accuracies with a verdict, and tiles of its first classes."""
-    published = (
-        read_csv(run.inputs.path("published"), *COLUMNS) if "published" in run.inputs else []
-    )
+    published = []
+    if "published" in run.inputs:
+        published = read_csv(run.inputs.path("published"), *COLUMNS)
     measured = run.inputs.table("accuracy", *COLUMNS, "seeds", "spread_points")
     tiles = [(caption, embedded(data)) for caption, data in example_tiles(run.shards)[:TILES]]
     return {
