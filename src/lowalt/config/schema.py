@@ -115,8 +115,9 @@ def with_numbers(settings: Any, schema: dict) -> Any:
             value = int(value)
         fits = any(Validator.TYPE_CHECKER.is_type(value, kind) for kind in kinds)
         if value is not error.instance and fits:
-            *above, key = [0, *error.absolute_path]
-            functools.reduce(operator.getitem, above, held)[key] = value
+            path: list[Any] = [0, *error.absolute_path]
+            above = functools.reduce(operator.getitem, path[:-1], held)
+            above[path[-1]] = value
     return held[0]
 
 

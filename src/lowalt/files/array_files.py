@@ -46,8 +46,7 @@ def array_of(path: str | Path, what: str, mapped: bool = False) -> np.ndarray:
     """
     path = existing(path, what)
     try:
-        mode = "r" if mapped else None
-        array = np.load(path, mmap_mode=mode, allow_pickle=False)
+        array = np.load(path, mmap_mode="r" if mapped else None, allow_pickle=False)
     except UNREADABLE as error:
         raise InputError(f"{path}: not a whole {what} file ({error})") from error
     if not isinstance(array, np.ndarray):

@@ -16,6 +16,8 @@ The truth is `lowalt.measure.fifty_digits`, at two random symbols and the deepes
 import functools
 import os
 import sys
+from collections.abc import Callable
+from typing import Any
 
 import mpmath
 import numpy as np
@@ -120,21 +122,20 @@ def measured(
 
     Tolerances are those that float64 keeps.
     """
-    arguments = (network, network.stations[0], *sample)
+    motion, rcs_m2, aim_m = sample
+    arguments = (network, network.stations[0], motion, rcs_m2, aim_m)
     repeats = block["repeats"]
     exact = echo_signal(*arguments)
     truth = truths(network, sample, exact.signal, exact.cell, seed)
-    calls = {
-        (NAIVE32, ""): (
-            functools.partial(echo_baselines.closed, *arguments, np.float32),
-            repeats,
-            1,
-        ),
-        (NAIVE64, ""): (functools.partial(echo_baselines.closed, *arguments), repeats, 1),
-        (NUFFT, ""): (functools.partial(echo_baselines.finufft, *arguments), repeats, 1),
+    closed = functools.partial(echo_baselines.closed, *arguments)
+    finufft = functools.partial(echo_baselines.finufft, *arguments)
+    calls: dict[tuple, tuple[Callable[[], Any], int, int]] = {
+        (NAIVE32, ""): (functools.partial(closed, dtype=np.float32), repeats, 1),
+        (NAIVE64, ""): (closed, repeats, 1),
+        (NUFFT, ""): (finufft, repeats, 1),
     }
     for tolerance in (None, *block["tolerances"]):
-        call = functools.partial(echo_signal, *arguments, tolerance)
+        call = functools.partial(echo_signal, *arguments, tolerance=tolerance)
         try:
             call()
         except BelowFloor:
@@ -142,7 +143,7 @@ def measured(
         # A call takes about a millisecond, so with only five calls one interrupt would be a quarter
         # of the time.
         calls[ENGINE, tolerance or "exact"] = call, repeats, 8
-    timed = in_turn(list(calls.values()))
+    timed: list[tuple[float, Any]] = in_turn(list(calls.values()))
     found = {}
     for (method, tolerance), (seconds, result) in zip(calls, timed, strict=True):
         signal = result.signal if method == ENGINE else result

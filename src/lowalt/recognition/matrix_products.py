@@ -67,10 +67,11 @@ class MatrixProduct(nn.Conv2d):
                 images.permute(0, 2, 3, 1), self.weight.flatten(1), self.bias
             ).movedim(-1, 1)
         axes = zip(images.shape[2:], self.kernel_size, self.stride, self.padding, strict=True)
-        spans = [_span(*axis) for axis in axes]
-        if None in spans:
+        down, across = (_span(*axis) for axis in axes)
+        if down is None or across is None:
             return super().forward(images)
-        (rows, top), (columns, left) = spans
+        rows, top = down
+        columns, left = across
         at = (slice(None), slice(None), slice(top, top + rows), slice(left, left + columns))
         product = _OnePixel.apply(images[:, :, :rows, :columns], self.weight, at)
         if self.bias is not None:

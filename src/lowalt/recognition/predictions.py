@@ -27,7 +27,7 @@ from lowalt.files.csv_tables import write_csv
 from lowalt.files.errors import InputError
 from lowalt.files.json_objects import read_object
 from lowalt.recognition.protocols import FOLDS
-from lowalt.recognition.samples import Facts
+from lowalt.recognition.samples import Facts, motion_names
 
 COLUMNS = ("key", "subtype", "group", "fold", "model", "snr_db", "label", "range_m", "aspect_deg")
 """Columns before the class probabilities."""
@@ -69,10 +69,14 @@ class Predictions:
     range_m: np.ndarray
     aspect_deg: np.ndarray
     probabilities: np.ndarray
-    motion = Facts.motion
 
     def __len__(self) -> int:
         return len(self.key)
+
+    @property
+    def motion(self) -> np.ndarray:
+        """Name of each sample's motion model, (samples,) text."""
+        return motion_names(self.subtype, self.model)
 
     @property
     def guesses(self) -> np.ndarray:

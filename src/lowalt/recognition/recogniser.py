@@ -60,7 +60,8 @@ def backbone(name: str, weights: str, size: int) -> nn.Module:
             )
         options["pretrained_cfg_overlay"] = {"file": weights}
     options["pretrained"] = weights != "none"
-    for extra in ({"img_size": size}, {}):
+    extras: tuple[dict, ...] = ({"img_size": size}, {})
+    for extra in extras:
         try:
             return timm.create_model(name, **options, **extra)
         except TypeError:

@@ -27,6 +27,11 @@ from lowalt.recognition.schemes import columns_in
 from lowalt.spectra.catalogue import LISTED
 
 
+def motion_names(subtype: np.ndarray, model: np.ndarray) -> np.ndarray:
+    """Return the name of each sample's motion model, (samples,) text."""
+    return np.char.add(np.char.add(subtype, "/"), model.astype(str))
+
+
 @dataclass(frozen=True)
 class Facts:
     """Metadata of samples, one entry each; range_m and aspect_rad have a column per station."""
@@ -47,7 +52,7 @@ class Facts:
     @property
     def motion(self) -> np.ndarray:
         """Name of each sample's motion model, (samples,) text."""
-        return np.char.add(np.char.add(self.subtype, "/"), self.model.astype(str))
+        return motion_names(self.subtype, self.model)
 
     def take(self, numbers: np.ndarray) -> "Facts":
         """Return the facts of the samples `numbers` (indices or a mask)."""
@@ -143,14 +148,14 @@ class ViewSamples(Samples):
     """Samples held in memory, read from cache files; the scheme's columns only."""
 
     def __init__(
-        self, paths: list[str | Path], columns: list[int], folds: set[tuple[str, str]]
+        self, paths: Sequence[str | Path], columns: list[int], folds: set[tuple[str, str]]
     ) -> None:
         """paths: cache files; columns: views to keep; folds: the (group, fold) pairs to keep.
 
         Raises: InputError naming a file that is no cache, differs in size, or where nothing is
         left.
         """
-        images = []
+        images: list[np.ndarray] = []
         facts = []
         for path in sorted(map(Path, paths)):
             of_file, facts_of_file = _load(path, columns, folds)
@@ -167,10 +172,11 @@ class ViewSamples(Samples):
         # Fill one array in place; np.concatenate would temporarily hold every image twice.
         self.images = np.empty((sum(map(len, images)), *images[0].shape[1:]), dtype=np.uint8)
         start = 0
-        for number, array in enumerate(images):
+        images.reverse()
+        while images:
+            array = images.pop()
             self.images[start : start + len(array)] = array
             start += len(array)
-            images[number] = None
         self.facts = joined(facts)
         self.size = self.images.shape[-1]
 

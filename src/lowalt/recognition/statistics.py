@@ -224,8 +224,8 @@ def f1_by_snr(
     _, first, model = np.unique(test.motion, return_index=True, return_inverse=True)
     weights = model_weights(test.subtype[first], whole_subtypes, repeats, generator)
     drawn = generator.integers(0, len(parts), (repeats, len(parts)))
-    values = {}
-    resampled = {}
+    values: dict[float | str, float] = {}
+    resampled: dict[float | str, np.ndarray] = {}
     for snr in np.unique(test.snr_db).tolist():
         counts = [
             _counts(predictions, test.snr_db == snr, model, len(first), classes)
@@ -234,7 +234,7 @@ def f1_by_snr(
         values[snr] = float(np.mean([macro_f1(seed.sum(0)) for seed in counts]))
         of_seed = np.stack([macro_f1(np.tensordot(weights, seed, 1)) for seed in counts], axis=1)
         resampled[snr] = np.take_along_axis(of_seed, drawn, axis=1).mean(1)
-    values["avg"] = np.mean(list(values.values()))
+    values["avg"] = float(np.mean(list(values.values())))
     resampled["avg"] = np.mean(list(resampled.values()), axis=0)
     bounds = {snr: np.quantile(means, [0.025, 0.975]) for snr, means in resampled.items()}
     return {snr: Interval(float(value), *map(float, bounds[snr])) for snr, value in values.items()}

@@ -83,8 +83,8 @@ def snr_text(snr_db: float) -> str:
 def accuracy_rows(runs: list[Evaluated], part: str, seed: int) -> Iterable[list]:
     """Yield the rows of accuracy.csv of one scheme's runs.
 
-    The columns are ACCURACY. Values are means over the runs, one per training seed; seed: of the bootstrap. Intervals of
-    macro F1 resample whole subtypes if these are held out from training.
+    The columns are ACCURACY. Values are means over the runs, one per training seed; seed: of the
+    bootstrap. Intervals of macro F1 resample whole subtypes if these are held out from training.
     """
     parts = [run.part(part) for run in runs]
     protocol = runs[0].protocol
@@ -94,7 +94,8 @@ def accuracy_rows(runs: list[Evaluated], part: str, seed: int) -> Iterable[list]
     scores = {}
     f1_by_snr = statistics.f1_by_snr(parts, len(runs[0].classes), whole, generator)
     for snr, interval in f1_by_snr.items():
-        scores[snr if snr == "avg" else snr_text(snr)] = interval
+        name_of_snr = snr if isinstance(snr, str) else snr_text(snr)
+        scores[name_of_snr] = interval
     of_runs = [statistics.accuracy_by(run.snr_db, run.correct) for run in parts]
     shares = {}
     counts = {}
@@ -132,10 +133,12 @@ def confusion_rows(runs: list[Evaluated], snr_db: float | None = None) -> Iterab
     snr_db: the SNR (dB) to count; None counts all.
     """
     classes = runs[0].classes
-    counts = 0
-    for test in (run.test for run in runs):
-        some = slice(None) if snr_db is None else test.snr_db == snr_db
-        counts = counts + statistics.confusion(test.label[some], test.guesses[some], len(classes))
+    counts = np.zeros((len(classes), len(classes)), int)
+    for run in runs:
+        test = run.test
+        if snr_db is not None:
+            test = test.take(test.snr_db == snr_db)
+        counts += statistics.confusion(test.label, test.guesses, len(classes))
     for true, name in enumerate(classes):
         for guess, other in enumerate(classes):
             yield [name, other, counts[true, guess]]

@@ -147,7 +147,7 @@ def _table(tracks: list[str], by_method: dict[str, dict[str, dict]]) -> list[tup
         """Minus the mean percent of a method over the tracks that it has."""
         own = by_method[name]
         percents = [number(own[track], "percent", TABLE) for track in tracks if track in own]
-        return -np.mean(percents or [0])
+        return -float(np.mean(percents or [0]))
 
     lines: list[tuple[str, ...]] = [tuple(heads)]
     for name in sorted(by_method, key=worse):

@@ -118,13 +118,14 @@ def row_lines(
         sizes = {key: _diagonal(hubs)}
     rows = [row for row in table.values() if row["category"] == category]
     near = min(rows, key=lambda row: abs(np.log(row[key] / sizes[key])))
-    cells = {"category": category}
+    cells: dict[str, object] = {"category": category}
     for name, value in sizes.items():
         if value:
             cells[name] = float(f"{value:.4g}")
     count = 2 if category == "Bird" else len(hubs)
     if count:
         cells["n_rotors_or_wings"] = count
+    speeds: tuple[str, ...]
     if category in AIRBORNE:
         speeds = ("vx_abs_max", "vy_abs_max", "vz_abs_max")
     else:
@@ -153,8 +154,8 @@ def _wings(inspection: Inspection) -> list[str]:
     mirrored_points = inspection.points.copy()
     mirrored_points[:, right] = 2 * middle - mirrored_points[:, right]
     outer = np.abs(inspection.points[:, right] - middle) > inspection.shoulder_m
-    off = cKDTree(mirrored_points).query(inspection.points[outer])[0]
-    if not outer.any() or off.mean() > WINGS_ALIKE * size:
+    off, _ = cKDTree(mirrored_points).query(inspection.points[outer])
+    if not outer.any() or np.mean(off) > WINGS_ALIKE * size:
         raise InputError(
             f"{inspection.path}: its sides along {'xyz'[right]} do not mirror one another, "
             "expected two wings: is one missing, or is --up or --front another axis?"

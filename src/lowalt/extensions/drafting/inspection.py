@@ -258,10 +258,11 @@ def _upright(
     extent = high - low
     stated = stated_up_axis(path)
     given_up, given_front = axes
-    front = given_front and "xyz".index(given_front[-1])
+    front = "xyz".index(given_front[-1]) if given_front else None
+    most_probable = given_up or stated
     ups = []
-    if given_up or stated:
-        ups.append("xyz".index((given_up or stated)[-1]))
+    if most_probable:
+        ups.append("xyz".index(most_probable[-1]))
     if not given_up:
         order = np.argsort(extent, kind="stable").tolist()
         ups += [axis for axis in order if axis not in (*ups, front)]

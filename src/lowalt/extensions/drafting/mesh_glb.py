@@ -49,15 +49,15 @@ class _Glb:
         self.json = json_object(data[20 : 20 + size].decode(), "its JSON", "glTF")
         self.binary = data[28 + size :]
 
-    def list(self, name: str) -> list:
+    def listed(self, name: str) -> list:
         """A list of the file's JSON, empty where it has none."""
         return self.json.get(name, [])
 
     def _view(self, index: int, kind: str, width: int, count: int, offset: int) -> np.ndarray:
         """`count` elements of `width` numbers of a buffer view, as they are stored."""
-        view = self.list("bufferViews")[_natural(index)]
+        view = self.listed("bufferViews")[_natural(index)]
         data = self.binary
-        uri = self.list("buffers")[_natural(view["buffer"])].get("uri")
+        uri = self.listed("buffers")[_natural(view["buffer"])].get("uri")
         if uri:
             head, _, text = uri.partition(";base64,")
             if not head.startswith("data:"):
@@ -73,7 +73,7 @@ class _Glb:
 
     def array(self, index: int) -> np.ndarray:
         """An accessor's numbers (count, width); normalised integers become fractions."""
-        accessor = self.list("accessors")[_natural(index)]
+        accessor = self.listed("accessors")[_natural(index)]
         kind = TYPES[accessor["componentType"]]
         width = WIDTHS[accessor["type"]]
         count = _natural(accessor["count"])
@@ -104,8 +104,8 @@ class _Glb:
 
     def placed(self) -> dict[int, np.ndarray]:
         """The pose (4, 4) of each node of the scene shown, by its number."""
-        nodes = self.list("nodes")
-        scenes = self.list("scenes")
+        nodes = self.listed("nodes")
+        scenes = self.listed("scenes")
         if scenes:
             roots = scenes[_natural(self.json.get("scene", 0))].get("nodes", [])
         else:
@@ -238,7 +238,7 @@ def pieces(path: Path) -> list[Piece]:
     """
     glb = _Glb(path.read_bytes())
     for name, word in COMPRESSED.items():
-        if name in glb.list("extensionsRequired"):
+        if name in glb.listed("extensionsRequired"):
             raise InputError(
                 f"{path}: is compressed by {word}, expected a plain GLB: export it without "
                 "compression"
@@ -247,10 +247,10 @@ def pieces(path: Path) -> list[Piece]:
     pieces = []
     taken = set()
     for index, pose in poses.items():
-        node = glb.list("nodes")[index]
+        node = glb.listed("nodes")[index]
         if "mesh" not in node:
             continue
-        mesh = glb.list("meshes")[_natural(node["mesh"])]
+        mesh = glb.listed("meshes")[_natural(node["mesh"])]
         shape = str(mesh.get("name", f"mesh {node['mesh']}"))
         name = str(node.get("name", shape))
         if name in taken:
@@ -265,7 +265,7 @@ def pieces(path: Path) -> list[Piece]:
                 names.insert(0, f"{name} {number}")
             piece = Piece(points, glb.faces(primitive, len(points)), tuple(names))
             if "skin" in node and "JOINTS_0" in primitive["attributes"]:
-                skin = glb.list("skins")[_natural(node["skin"])]
+                skin = glb.listed("skins")[_natural(node["skin"])]
                 pieces.append(replace(piece, vertices=glb.skinned(points, primitive, skin, poses)))
                 continue
             pieces += _placed(piece, name, pose, _instances(glb, node))

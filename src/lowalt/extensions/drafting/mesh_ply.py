@@ -4,6 +4,7 @@ trimesh drops strips, and takes all faces of a binary file to be as long as its 
 writes mixed ones). Source: Greg Turk, The PLY Polygon File Format (1994).
 """
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -96,7 +97,7 @@ class _Ply:
 
     def element(
         self, count: int, properties: list[list[str]]
-    ) -> dict[str, np.ndarray | list[np.ndarray]]:
+    ) -> Mapping[str, np.ndarray | list[np.ndarray]]:
         """The values of an element's properties by name.
 
         They are read at once where all lists of a property are as long as its first one, otherwise
@@ -118,11 +119,11 @@ class _Ply:
         rows = np.dtype(fields)
         if start + rows.itemsize * count <= len(self.data):
             table = self.take(rows, count)
-            sizes = [table[name] for name in table.dtype.names if name.startswith("size ")]
+            sizes = [table[name] for name in rows.fields or () if name.startswith("size ")]
             if all((of_list == of_list[0]).all() for of_list in sizes):
                 return {words[-1]: table[words[-1]] for words in properties}
         self.at = start
-        values = {words[-1]: [] for words in properties}
+        values: dict[str, list[np.ndarray]] = {words[-1]: [] for words in properties}
         for _ in range(count):
             for words in properties:
                 size = self.size(words) if words[0] == "list" else 1
@@ -137,7 +138,7 @@ def pieces(path: Path) -> list[Piece]:
     """
     ply = _Ply(path.read_bytes())
     vertices = np.zeros((0, 3))
-    polygons = []
+    polygons: Sequence[np.ndarray] | np.ndarray = []
     faces = []
     for name, count, properties in ply.elements:
         values = ply.element(count, properties)

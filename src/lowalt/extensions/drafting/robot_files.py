@@ -8,7 +8,7 @@ read in `robot_mjcf`. yourdfpy reads URDF alone; the three formats share what is
 
 import itertools
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 from typing import NamedTuple
@@ -136,6 +136,15 @@ def _sdf_joint(element: Element, name: str, scope: str, ends: list[str], frame: 
     return _Joint(name, scope, ends, element, axis, frame, limits)
 
 
+def _link_name(joint: Element, end: str) -> str:
+    """The link that a joint of a URDF names as its parent or child."""
+    element = joint.find(end)
+    name = None if element is None else element.get("link")
+    if name is None:
+        raise ValueError(f"joint {joint.get('name')!r} names no {end}")
+    return name
+
+
 class _Links:
     """Links and joints by scoped name, whose frames each have a pose in another frame.
 
@@ -168,8 +177,8 @@ class _Links:
             self.frames[name] = ("", np.eye(4))
             self.links.append((name, link, base))
         for joint in root.findall("joint"):
-            parent = joint.find("parent").get("link")
-            child = joint.find("child").get("link")
+            parent = _link_name(joint, "parent")
+            child = _link_name(joint, "child")
             name = joint.get("name", child)
             frame = f"{name} joint"
             # The parent may be the world, which need not be a link.
@@ -333,7 +342,7 @@ def read_robot(path: Path, inputs: Path) -> Robot:
         raise InputError(f"{path}: is a template, expected what it expands to: {how}")
     files = Files(inputs)
     links = _Links(files)
-    readers = {
+    readers: dict[str, Callable[[Element, Path], Robot]] = {
         "robot": links.urdf,
         "sdf": links.sdf,
         "gazebo": links.sdf,

@@ -3,7 +3,7 @@
 import math
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
@@ -61,7 +61,7 @@ class Robot:
     joints: list[Joint] = field(default_factory=list)
     senses: dict[str, str] = field(default_factory=dict)
 
-    def below(self, link: str, others: set[str] = frozenset()) -> list[str]:
+    def below(self, link: str, others: Collection[str] = ()) -> list[str]:
         """Return a link and all links below it, except `others` and the links below them."""
         pairs = [*self.fixed, *((joint.parent, joint.child) for joint in self.joints)]
         links = [link]
@@ -221,7 +221,7 @@ class Files:
         unit = 1.0
         if path.suffix.lower() == ".dae":
             unit = stated_metres(path) or 1.0
-        pieces = [piece.vertices[piece.faces] for piece in selected(path, part and [part])]
+        pieces = [piece.vertices[piece.faces] for piece in selected(path, [part] if part else None)]
         if not pieces:
             raise InputError(f"{name!r} has no triangle, expected a surface")
         triangles = np.concatenate(pieces) * unit * scale

@@ -112,9 +112,9 @@ def parts_of(
     ahead: (3,) the direction to the front, of which wings need to know.
     Raises: InputError where nothing is left for the body.
     """
-    joints = {}
-    taken = {}
-    triangles = {}
+    joints: dict[str, Joint] = {}
+    taken: dict[str, str] = {}
+    triangles: dict[str, list[np.ndarray]] = {}
     chosen = turning(robot, kind, ahead)
     ends = {joint.child for joint in chosen}
     for joint in chosen:

@@ -5,7 +5,7 @@ That target has the same frame and is nearest in size.
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import yaml
@@ -236,7 +236,7 @@ def draft_target(
         raise InputError(f"data sheet of a {kind}: it states {[*stated]}, expected {sorted(known)}")
     row: dict = {}
     for word, names in cells.items():
-        values = np.ravel(stated.get(word)).tolist()
+        values: list = np.ravel(np.array(stated.get(word))).tolist()
         if len(values) not in (1, len(names)):
             raise InputError(
                 f"data sheet of a {kind}: {word} is {stated[word]}, expected {len(names)} numbers"
@@ -244,7 +244,7 @@ def draft_target(
         if len(values) == 1:
             values *= len(names)
         row |= dict(zip(names, values, strict=True))
-    of_frame = {figures[word]: stated[word] for word in figures}
+    of_frame: dict[str, Any] = {figures[word]: stated[word] for word in figures}
     sheet = Sheet(category, frame or usual, row, of_frame, about)
     if out is None:
         return drafted_sheet(sheet, subtype or f"My {kind}")

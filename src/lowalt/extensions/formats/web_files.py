@@ -67,7 +67,7 @@ def span(address: str, first: int, most: int) -> bytes:
             return next(answer.iter_content(most), b"")
     except requests.RequestException as error:
         # What ended the last of several attempts.
-        cause: object = error
+        cause: Exception = error
         if error.args:
             cause = getattr(error.args[0], "reason", error)
         raise InputError(f"{address}: cannot be read ({in_one_line(cause)})") from None

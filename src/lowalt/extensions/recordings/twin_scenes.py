@@ -457,13 +457,13 @@ class Library:
         usual = load_yaml(shipped(SCENES), "usual scenes")
         twins = {}
         scenes = {}
-        own_targets: dict[str, None] = {}
+        own_targets: dict[str | Path, None] = {}
         for name, (about, twin, snr_db) in radars.items():
             twins[name] = twin
             scenes[name] = scenes_of(about, snr_db, usual)
             own_targets |= dict.fromkeys((about.twin or {}).get("targets", []))
         table = shipped(usual["targets"]["table"])
-        files = [*map(shipped, usual["targets"]["records"]), *own_targets]
+        files: list[str | Path] = [*map(shipped, usual["targets"]["records"]), *own_targets]
         return cls(int(usual["seed"]), twins, scenes, load_records(table, files))
 
     @classmethod
@@ -475,11 +475,12 @@ class Library:
         """
         radars = {}
         for name, about in records(folder, over).items():
-            if "snr_db" not in (about.twin or {}):
+            said = about.twin or {}
+            if "snr_db" not in said:
                 raise InputError(
                     f"{about.file}: the record says nothing of twin.snr_db, expected a range in dB"
                 )
-            radars[name] = about, twin_of(about, float(about.rate_hz or 0)), about.twin["snr_db"]
+            radars[name] = about, twin_of(about, float(about.rate_hz or 0)), said["snr_db"]
         return cls.of(radars)
 
     def simulated(
