@@ -31,13 +31,13 @@ def amplitudes(
     network: Network, station: Station, motion: Rigid, rcs_m2, aim_m
 ) -> tuple[np.ndarray, np.ndarray]:
     """Ranges (N, L) m and complex amplitudes (N, L) with array gains, as precise as the motion."""
-    place, horizontal, aim, rcs = (
+    position, horizontal, aim, rcs = (
         np.asarray(value, motion.points.dtype)
         for value in (station.position_m, station.horizontal, aim_m, rcs_m2)
     )
-    d = positions(motion) - place
+    d = positions(motion) - position
     r = np.sqrt(np.einsum("nli,nli->nl", d, d))
-    aim = (aim - place) / np.linalg.norm(aim - place)
+    aim = (aim - position) / np.linalg.norm(aim - position)
     kappa = station.frequency_hz / network.carrier_hz
     psi = d @ horizontal / r - aim @ horizontal
     omega = d[..., 2] / r - aim[2]

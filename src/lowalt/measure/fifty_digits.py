@@ -76,8 +76,8 @@ def cells_mp(network, station, points_m, rcs_m2, aim_m, cells, digits=50):
             for array in (network.transmit, network.receive):
                 gain *= _run(step_h, array[0]) * _run(step_v, array[1])
             gain *= mpmath.expjpi(-4 * low * r / mpf(C))
-            for place, cell in enumerate(cells):
+            for index, cell in enumerate(cells):
                 step = mpmath.expjpi(2 * mpf(int(cell)) / count - 4 * spacing * r / mpf(C))
-                sums[place] += gain * _run(step, count) / count
+                sums[index] += gain * _run(step, count) / count
         scale = mpmath.sqrt(mpf(network.power) / (n_t * n_r))
         return [scale * value for value in sums]

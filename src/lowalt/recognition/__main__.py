@@ -81,7 +81,7 @@ def _source(options: Namespace):
 
     for sums in options.frozen:
         verify(sums)
-    if sum(place is not None for place in (options.views, options.index, options.dataset)) != 1:
+    if sum(source is not None for source in (options.views, options.index, options.dataset)) != 1:
         raise InputError("expected one of --views, --index and --dataset")
     if options.dataset is None:
         return Source(options.views, options.index)

@@ -28,9 +28,9 @@ def bootstrap(
     Source: Efron and Tibshirani, An Introduction to the Bootstrap, 1993, ch. 13; clusters as in the
     module's docstring.
     """
-    _, place = np.unique(clusters, return_inverse=True)
-    count = np.bincount(place).astype(float)
-    total = np.bincount(place, weights=values)
+    _, cluster = np.unique(clusters, return_inverse=True)
+    count = np.bincount(cluster).astype(float)
+    total = np.bincount(cluster, weights=values)
     means = np.empty(repeats)
     for repeat in range(repeats):
         chosen = generator.integers(0, len(count), len(count))
@@ -45,13 +45,12 @@ def model_shares(
     """Return the first sample, number of samples and share of correct ones of each motion model.
 
     The first two are (models,); the share is (seeds, models).
-
     motion (samples,): name of the motion model; correct: (samples,) of every training seed.
     """
-    _, first, place, count = np.unique(
+    _, first, model, count = np.unique(
         motion, return_index=True, return_inverse=True, return_counts=True
     )
-    sums = np.array([np.bincount(place, weights=row) for row in correct])
+    sums = np.array([np.bincount(model, weights=row) for row in correct])
     return first, count, sums / count
 
 
@@ -91,11 +90,11 @@ def _subtype_weights(
     theirs. Deviations are stretched for few subtypes, so a weight may be slightly negative. Source:
     Davison and Hinkley 1997, section 3.8.
     """
-    names, place = np.unique(subtypes, return_inverse=True)
+    names, subtype = np.unique(subtypes, return_inverse=True)
     if len(names) == 1:
         return np.ones((repeats, len(subtypes)))
     drawn = generator.multinomial(len(names), np.full(len(names), 1 / len(names)), repeats)
-    return (1 + (drawn - 1) * _stretch(len(names), len(names) - 1))[:, place]
+    return (1 + (drawn - 1) * _stretch(len(names), len(names) - 1))[:, subtype]
 
 
 def model_weights(
@@ -110,11 +109,11 @@ def model_weights(
         return generator.multinomial(
             len(subtypes), np.full(len(subtypes), 1 / len(subtypes)), repeats
         ).astype(float)
-    names, place = np.unique(subtypes, return_inverse=True)
+    names, subtype = np.unique(subtypes, return_inverse=True)
     drawn = generator.multinomial(len(names), np.full(len(names), 1 / len(names)), repeats)
     weights = np.zeros((repeats, len(subtypes)))
     for number in range(len(names)):
-        members = np.flatnonzero(place == number)
+        members = np.flatnonzero(subtype == number)
         # For a subtype drawn twice, its motion models are drawn twice, independently.
         weights[:, members] = generator.multinomial(
             drawn[:, number] * len(members), np.full(len(members), 1 / len(members))

@@ -77,8 +77,8 @@ def answer(trained: Trained, images: np.ndarray, settings: dict, where: str) -> 
     not finite.
     """
     names = named(settings["spectra"])
-    places = columns_in(trained.scheme.columns, names, len(images) // len(names), where)
-    views = torch.from_numpy(resize(images, trained.size)[places][None])
+    columns = columns_in(trained.scheme.columns, names, len(images) // len(names), where)
+    views = torch.from_numpy(resize(images, trained.size)[columns][None])
     with torch.inference_mode():
         shares = trained.model(views).double().softmax(1)[0]
     if not torch.isfinite(shares).all():

@@ -202,7 +202,7 @@ def scheme(row: dict, where: str, stations: Sequence[str]) -> Scheme:
 
 
 def _rows(path: str | Path) -> dict[str, tuple[dict, str]]:
-    """Rows of a table, each with its place in words, by the scheme's name; no name stands twice."""
+    """Rows of a table, each with its file and line in words, by the scheme's name."""
     rows: dict[str, tuple[dict, str]] = {}
     for number, row in enumerate(read_csv(path, "scheme", what="table of schemes"), start=2):
         name = row["scheme"]
