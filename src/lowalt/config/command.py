@@ -33,7 +33,7 @@ def exit_status(code: int) -> int:
     return 128 - code
 
 
-def parser(module: str, description: str) -> argparse.ArgumentParser:
+def parser(module: str, description: str | None) -> argparse.ArgumentParser:
     """Return an argument parser for `python -m {module}` that already has `--settings`."""
     result = argparse.ArgumentParser(prog=f"python -m {module}", description=description)
     result.add_argument(

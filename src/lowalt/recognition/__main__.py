@@ -190,9 +190,9 @@ def _transfer(arguments: list[str]) -> None:
     first, *others = map(load_yaml, options.configs)
     for other in others:
         transfer.check_folds(first, other)
-    own = [Evaluated(path) for path in options.own]
-    other = [Evaluated(path) for path in options.other]
-    transfer.write(own, other, names(options.schemes), options.out, seed)
+    own_models = [Evaluated(path) for path in options.own]
+    other_models = [Evaluated(path) for path in options.other]
+    transfer.write(own_models, other_models, names(options.schemes), options.out, seed)
 
 
 def _distances(arguments: list[str]) -> None:

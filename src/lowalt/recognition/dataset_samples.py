@@ -119,8 +119,8 @@ class DatasetSamples(samples.Samples):
             columns, named(dataset.maker.render["spectra"]), stations, "dataset"
         )
         self.stations = stations_of(dataset.maker, self.columns)
-        self.rows = []
-        self.chosen = []
+        self.rows: list[dict] = []
+        self.chosen: list[tuple[int, float]] = []
         of_shards = []
         for name in sorted(dataset.plan.shards, key=lambda shard: f"{shard}.tar"):
             group, fold, number = name.split("-")

@@ -1,6 +1,6 @@
 """Where training and evaluation read samples: caches of views, shards, or simulation on access."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,7 +20,7 @@ class Source:
     stored samples does not import the simulation.
     """
 
-    views: list[str | Path] | None = None
+    views: Sequence[str | Path] | None = None
     index: str | Path | None = None
     made: Callable[..., Samples] | None = None
 
@@ -42,9 +42,9 @@ class Source:
         """
         if self.made is not None:
             return self.made(columns, pairs, size, placed)
-        if self.views is None:
+        if self.index is not None:
             return ShardSamples(self.index, columns, pairs, size, placed)
-        cached = ViewSamples(self.views, columns, pairs)
+        cached = ViewSamples(self.views or (), columns, pairs)
         if cached.size != size:
             raise InputError(f"--views: images of {cached.size} pixels, expected {size}")
         return cached

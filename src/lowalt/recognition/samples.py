@@ -123,6 +123,10 @@ class Samples:
     facts: Facts
     size: int
 
+    def keep(self, numbers: np.ndarray) -> None:
+        """Drop all samples but those at `numbers`."""
+        raise NotImplementedError
+
     def views(self, numbers: np.ndarray) -> np.ndarray:
         """Index images (len(numbers), columns, size, size) uint8 of the samples `numbers`."""
         raise NotImplementedError

@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-import timm
 import torch
+from timm.utils import ModelEmaV3
 from torch import nn
 
 from lowalt.files.csv_tables import write_csv
@@ -136,7 +136,7 @@ class Trainer:
             shared = as_products(shared)
         self.model = shared.to(machine.device, memory_format=layout)
         self.optimiser = optimiser(self.model, self.block)
-        self.average = timm.utils.ModelEmaV3(self.model)
+        self.average = ModelEmaV3(self.model)
         step_model = self.model
         if self.block["compile"]:
             step_model = torch.compile(self.model)

@@ -106,8 +106,8 @@ def write(
     Each of `other` says which run trained it.
     Raises: InputError where a model has no counterpart in this run.
     """
-    mine = {}
-    theirs = {}
+    mine: dict[tuple[str, str], list[Evaluated]] = {}
+    theirs: dict[tuple[str, str, str], list[Evaluated]] = {}
     for run in own:
         mine.setdefault((run.protocol, run.scheme), []).append(run)
     for run in other:

@@ -22,7 +22,7 @@ from lowalt.recognition.schemes import columns_in
 from lowalt.shards import ShardSet
 from lowalt.tiles import reduced
 
-_KEY = re.compile(r"(.+)-\d{6}-snr")
+_KEY = re.compile(r"(.+)-\d{6}-snr.*")
 
 
 def geometry(record: dict, network: Network) -> tuple[list[float], list[float]]:
@@ -73,7 +73,7 @@ def facts_of(shards: ShardSet, numbers: np.ndarray, placed: bool = True) -> Fact
     names: dict[str, str] = {}
     subtypes = []
     for sample, number in enumerate(numbers):
-        slug = _KEY.match(keys[sample])[1]
+        slug = _KEY.sub(r"\1", keys[sample])
         if placed or slug not in names:
             record = shards.record(number)
             names[slug] = record["subtype"]
@@ -175,8 +175,7 @@ class ShardSamples(samples.Samples):
         Raises: InputError where nothing is left.
         """
         groups = sorted({group for group, _ in folds})
-        names = sorted({fold for _, fold in folds})
-        self.shards = ShardSet(index, groups, names)
+        self.shards = ShardSet(index, groups, sorted({fold for _, fold in folds}))
         self.size = size
         known = station_names(self.shards.index["render"]["network"])
         names = self.shards.spectra

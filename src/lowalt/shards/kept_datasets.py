@@ -103,19 +103,23 @@ def _state(path: Path) -> object:
 
 
 def _checked(layers: Sequence[Layer]) -> Kept:
-    """The configuration of layers on the embedded default, or the whole one that they are."""
-    schema = shipped(SCHEMA)
-    only = layers[0]
-    is_whole = (
-        len(layers) == 1
-        and isinstance(only, dict)
-        and set(load_yaml(schema)["required"]) <= set(only)
-    )
-    config = check(copy.deepcopy(only), schema) if is_whole else overlaid(layers)
+    """A whole configuration checked, or layers on the embedded default, with what they name."""
+    config = _configuration(layers)
     inputs = config["inputs"] or os.environ.get("LOWALT_INPUTS")
     targets = located(config)["targets"]
     states = {path: _state(path) for path in _named_files(located(config), inputs)}
     return Kept(config, records_of(targets, inputs), inputs, states, {})
+
+
+def _configuration(layers: Sequence[Layer]) -> dict:
+    """The configuration of layers on the embedded default, or the whole one that they are."""
+    schema = shipped(SCHEMA)
+    only = layers[0]
+    if len(layers) == 1 and isinstance(only, dict):
+        is_whole = set(load_yaml(schema)["required"]) <= set(only)
+        if is_whole:
+            return check(copy.deepcopy(only), schema)
+    return overlaid(layers)
 
 
 def _made(kept: Kept, subtype: str) -> Dataset:

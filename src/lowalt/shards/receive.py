@@ -184,11 +184,11 @@ def _described(
     """The values with their axes and the truth."""
     view = sample.view
     station: Station = view.station
-    frequencies_hz = np.empty(0)
+    frequencies_hz: np.ndarray = np.empty(0)
     if at in ("subcarriers", "receiver"):
         offsets_hz = np.arange(network.subcarriers) * network.subcarrier_spacing_hz
         frequencies_hz = station.frequency_hz + offsets_hz
-    ranges_m = np.empty(0)
+    ranges_m: np.ndarray = np.empty(0)
     if at in ("cells", "canceller"):
         ranges_m = np.arange(values.shape[1]) * network.cell_m
     times_s = view.times_s

@@ -149,7 +149,7 @@ def make(options: argparse.Namespace) -> Answer:
         f"{' '.join(options.track)}: from empty {_words(*asked)}; what is there is kept",
         file=sys.stderr,
     )
-    facts = {}
+    facts: dict[str, list[str]] = {}
     lines = []
     for part, pairs in parts_of(asked).items():
         run_options = argparse.Namespace(

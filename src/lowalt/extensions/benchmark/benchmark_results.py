@@ -1,7 +1,5 @@
 """Section: the kept table of baselines, where the run's data are a benchmark's."""
 
-from pathlib import Path
-
 from lowalt.extensions.benchmark.baseline_table import COLUMNS, tables
 from lowalt.report.reported_run import ReportedRun
 
@@ -11,5 +9,5 @@ def values(run: ReportedRun) -> dict | None:
     if "benchmark" not in run.inputs:
         return None
     rows = run.inputs.table("benchmark", *COLUMNS)
-    name = Path(run.inputs.files["benchmark"]).parent.name
+    name = run.inputs.path("benchmark").parent.name
     return {"name": name, "tables": tables(rows), "hardware": rows[0]["hardware"]}

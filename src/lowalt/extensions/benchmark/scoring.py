@@ -141,7 +141,7 @@ def scores(track: Track, answers: list[np.ndarray], baselines: dict[str, np.ndar
     by_name = {}
     for subtype, (share, _) in accuracy_by(facts.subtype, right).items():
         by_name[subtype] = 100 * share
-    more = {}
+    more: dict = {}
     if track.whole:
         more |= by_subtype(found.values, found.weight, found.subtypes)
     if track.headline == "AUROC":

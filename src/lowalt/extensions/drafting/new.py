@@ -117,7 +117,7 @@ def draft(asked: Asked, show: Callable[[Inspection], None]) -> Draft:
             "it"
         )
     if not is_description(asked.file):
-        category = asked.row.get("category") or asked.category
+        category = str(asked.row.get("category") or asked.category)
         text = _of_mesh(asked, asked.file, path.relative_to(inputs).as_posix(), category, show)
         _check(asked, text, asked.inputs)
         return Draft(text)

@@ -192,8 +192,11 @@ def _new(options: argparse.Namespace) -> Answer:
         _write(asked.picture, inspection_picture(seen, numbered=True))
 
     made = draft(asked, show)
-    files = {options.out: made.text.encode(), options.inputs / asked.glb: made.glb}
-    files = {path: data for path, data in files.items() if path is not None and data is not None}
+    files: dict[Path, bytes] = {}
+    if options.out is not None:
+        files[options.out] = made.text.encode()
+    if made.glb is not None:
+        files[options.inputs / asked.glb] = made.glb
     for path in files:
         if path.exists():
             raise InputError(f"{path}: is there already, expected a new file")
