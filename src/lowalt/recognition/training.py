@@ -8,7 +8,7 @@ libraries hide; without a library the loop is still one page. The settings are t
 import math
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
@@ -104,7 +104,7 @@ class Trainer:
     def __init__(
         self,
         model: nn.Module,
-        samples: dict[str, Samples],
+        samples: Mapping[str, Samples],
         columns: list[int],
         settings: dict,
         run: TrainingRun,

@@ -51,8 +51,10 @@ WHAT = {
 
 def _table(header: tuple[str, ...], rows: list[tuple]) -> str:
     """Return a Markdown table."""
-    lines = [header, tuple("---" for _ in header), *rows]
-    return "\n".join("| " + " | ".join(str(cell) for cell in line) + " |" for line in lines) + "\n"
+    text = ""
+    for line in [header, tuple("---" for _ in header), *rows]:
+        text += "| " + " | ".join(str(cell) for cell in line) + " |\n"
+    return text
 
 
 def _slug(key: str) -> str:

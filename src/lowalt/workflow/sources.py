@@ -7,7 +7,7 @@ it.
 import ast
 import functools
 import importlib.util
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from lowalt.config.extensions import offered
@@ -64,8 +64,10 @@ def _imports(path: Path, package: str = PACKAGE.name) -> tuple[str, ...]:
     """
     tree = ast.parse(path.read_bytes(), str(path))
     modules = []
-    top_level_only = path.name == "__main__.py" or path == PACKAGE / "__init__.py"
-    for node in tree.body if top_level_only else _statements(tree.body):
+    statements: Iterable[ast.stmt] = _statements(tree.body)
+    if path.name == "__main__.py" or path == PACKAGE / "__init__.py":
+        statements = tree.body
+    for node in statements:
         if isinstance(node, ast.Import):
             modules += [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom) and node.module:
