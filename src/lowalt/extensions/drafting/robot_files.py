@@ -41,7 +41,7 @@ UNUSED = ("gazebo", "transmission", "sensor", "ros2_control")
 """Elements that say nothing about shapes and joints, so that macros in them do no harm."""
 
 
-class _Joint(NamedTuple):
+class _DescribedJoint(NamedTuple):
     """A joint as a file states it.
 
     name, ends: scoped name, names of the parent's and the child's link; scope: ends in :: where it
@@ -129,11 +129,13 @@ def _axis_frame(joint: Element, version: tuple[int, ...], own: str, model: str, 
     return own
 
 
-def _sdf_joint(element: Element, name: str, scope: str, ends: list[str], frame: str) -> _Joint:
+def _sdf_joint(
+    element: Element, name: str, scope: str, ends: list[str], frame: str
+) -> _DescribedJoint:
     """A joint of an SDF, whose axis is given in a frame."""
     axis = numbers(element.findtext("axis/xyz"), 3, (0, 0, 1))
     limits = (element.findtext("axis/limit/lower"), element.findtext("axis/limit/upper"))
-    return _Joint(name, scope, ends, element, axis, frame, limits)
+    return _DescribedJoint(name, scope, ends, element, axis, frame, limits)
 
 
 def _link_name(joint: Element, end: str) -> str:
@@ -156,7 +158,7 @@ class _Links:
         self.robot = Robot()
         self.frames: dict[str, tuple[str, np.ndarray]] = {"": ("", np.eye(4))}
         self.links: list[tuple[str, Element, Path]] = []
-        self.joints: list[_Joint] = []
+        self.joints: list[_DescribedJoint] = []
 
     def pose(self, frame: str, depth: int = 0) -> np.ndarray:
         """The pose (4, 4) of a frame."""
@@ -193,7 +195,9 @@ class _Links:
             limit = joint.find("limit")
             if limit is not None:
                 limits = (limit.get("lower", "0"), limit.get("upper", "0"))
-            self.joints.append(_Joint(name, "", [parent, child], joint, axis, frame, limits))
+            self.joints.append(
+                _DescribedJoint(name, "", [parent, child], joint, axis, frame, limits)
+            )
         return self.done()
 
     def sdf(self, root: Element, base: Path) -> Robot:

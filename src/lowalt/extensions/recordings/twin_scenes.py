@@ -1,8 +1,8 @@
 """Scenes of a twin: targets in front of the radar and their courses, drawn from ranges.
 
-`Scene` lists the keys of a scene (`scene` in brought.schema.yaml). A value of a scene is a number,
-[low, high] for a uniform draw, or [a, b, c, ...] for one whose stretches a to b, b to c and so on
-are equally probable.
+`TwinScene` lists the keys of a scene (`scene` in brought.schema.yaml). A value of a scene is a
+number, [low, high] for a uniform draw, or [a, b, c, ...] for one whose stretches a to b, b to c and
+so on are equally probable.
 """
 
 import math
@@ -65,7 +65,7 @@ def value(setting: Setting, rng: np.random.Generator) -> float:
 
 
 @dataclass(frozen=True)
-class Scene:
+class TwinScene:
     """The keys of a scene, with their units; None for a key that the scene does not state.
 
     A course takes the keys of its own section below; everything else is for any course.
@@ -124,7 +124,8 @@ class Scene:
 def clouds_of(records: dict[str, dict], names: list[str], seed: int) -> dict[str, Cloud]:
     """Return the built-in clouds of the subtypes `names`.
 
-    records: the merged record of each subtype. Raises: InputError naming a subtype without a built-in record.
+    records: the merged record of each subtype.
+    Raises: InputError naming a subtype without a built-in record.
     """
     for name in names:
         if name not in records or records[name]["source"] not in ("builtin", "gait"):
@@ -135,7 +136,7 @@ def clouds_of(records: dict[str, dict], names: list[str], seed: int) -> dict[str
 
 
 def _course(
-    scene: Scene, cloud: Cloud, times_s: np.ndarray, rng: np.random.Generator
+    scene: TwinScene, cloud: Cloud, times_s: np.ndarray, rng: np.random.Generator
 ) -> tuple[Course, float]:
     """The course at the times, and the target's speed (m/s)."""
     kind = scene.stated("course")
@@ -189,7 +190,7 @@ def _driven(
     return course, own_mps
 
 
-def _rate(scene: Scene, cloud: Cloud, speed: float, rng: np.random.Generator) -> float:
+def _rate(scene: TwinScene, cloud: Cloud, speed: float, rng: np.random.Generator) -> float:
     """The rate (Hz) of rotors, wings or wheels; wheels roll at the speed (m/s).
 
     Rotors and wings take the rates of the table of targets where the scene says none.
@@ -209,25 +210,25 @@ def heard(
 ) -> tuple[np.ndarray, str]:
     """Return the complex echo (N,) of one drawn scene at the receiver, and the subtype's name.
 
-    settings: keys of `Scene`; seconds: length without the margins, which the echo includes. A
+    settings: keys of `TwinScene`; seconds: length without the margins, which the echo includes. A
     second target, where the scene has one, has a position and speed of its own.
     Raises: InputError for a scene with a wrong key or value.
     """
-    scene = Scene(**settings)
+    scene = TwinScene(**settings)
     if scene.others is not None:
         kind = scene.others[int(rng.integers(len(scene.others)))]
         count = math.ceil((seconds + 2 * MARGIN * twin.symbol_interval_s) * twin.rate_hz)
         return other_echo(kind, twin, count, rng), kind
     signal, name = _of_one_target(twin, scene, clouds, rng, seconds)
     if scene.second is not None and rng.uniform() < scene.second["share"]:
-        other = Scene(**scene.second.get("scene", settings))
+        other = TwinScene(**scene.second.get("scene", settings))
         second, _ = _of_one_target(twin, other, clouds, rng, seconds)
         level = 10 ** (value(scene.second["level_db"], rng) / 20)
         signal = signal + level * rms(signal) / max(rms(second), 1e-300) * second
     return signal, name
 
 
-def _cloud(scene: Scene, clouds: dict[str, Cloud], rng: np.random.Generator) -> Cloud:
+def _cloud(scene: TwinScene, clouds: dict[str, Cloud], rng: np.random.Generator) -> Cloud:
     """The cloud of a drawn subtype with the flapping, size and strengths that the scene sets."""
     subtypes = scene.stated("subtypes")
     cloud = clouds[subtypes[int(rng.integers(len(subtypes)))]]
@@ -249,7 +250,7 @@ def _cloud(scene: Scene, clouds: dict[str, Cloud], rng: np.random.Generator) -> 
 
 
 def _of_one_target(
-    twin: Twin, scene: Scene, clouds: dict[str, Cloud], rng: np.random.Generator, seconds: float
+    twin: Twin, scene: TwinScene, clouds: dict[str, Cloud], rng: np.random.Generator, seconds: float
 ) -> tuple[np.ndarray, str]:
     """As `_drawn_echo`. Raises: InputError for a key that the scene lacks or that does not fit."""
     try:
@@ -262,7 +263,7 @@ def _of_one_target(
 
 
 def _drawn_echo(
-    twin: Twin, scene: Scene, clouds: dict[str, Cloud], rng: np.random.Generator, seconds: float
+    twin: Twin, scene: TwinScene, clouds: dict[str, Cloud], rng: np.random.Generator, seconds: float
 ) -> tuple[np.ndarray, str]:
     """The echo of one drawn target, and its subtype's name."""
     cloud = _cloud(scene, clouds, rng)
@@ -355,7 +356,7 @@ def intervals(
 ) -> tuple[np.ndarray, list[str]]:
     """Return simulated coherent intervals (count, receivers, symbols) and their subtypes' names.
 
-    scene: keys of `Scene`; quiet: the same without the targets, where targets move.
+    scene: keys of `TwinScene`; quiet: the same without the targets, where targets move.
     Each of `count` scenes is drawn once. Its echo goes to `receivers` receivers, each drawn from
     the scene's ranges. As with recordings, a window counts if its target stands above the noise
     (`presence.present`); a hovering target counts at any SNR. A scene whose target no receiver
@@ -439,7 +440,7 @@ def scenes_of(record: Record, snr_db: list[float], usual: dict) -> dict[str, lis
 class Library:
     """All twins of some radars, their scenes and the records of all targets.
 
-    twins: name -> twin; scenes: name -> category -> scenes with the keys of `Scene`, receivers
+    twins: name -> twin; scenes: name -> category -> scenes with the keys of `TwinScene`, receivers
     filled in; records: subtype -> record.
     """
 
