@@ -227,7 +227,7 @@ TOKENS = {
     "shards": 25012,
     "recognition": 33021,
     "measure": 5423,
-    "report": 15982,
+    "report": 17_630,
     "workflow": 11455,
     "commands": 6429,
     "extensions/benchmark": 12325,
