@@ -216,7 +216,7 @@ TOKENS = {
     "files": 4466,
     "machine": 2994,
     "numerics": 9630,
-    "config": 7021,
+    "config": 7_902,
     "targets": 45724,
     "motion": 9026,
     "echo": 19774,
@@ -232,7 +232,7 @@ TOKENS = {
     "commands": 6429,
     "extensions/benchmark": 12325,
     "extensions/drafting": 27658,
-    "extensions/formats": 2180,
+    "extensions/formats": 2_307,
     "extensions/recordings": 31329,
     "extensions/town": 22928,
 }

@@ -11,9 +11,9 @@ from pathlib import Path
 
 from lowalt.commands.command_line import Answer, add_command
 from lowalt.config.command import exit_status
+from lowalt.config.layers import read_layer
 from lowalt.files.errors import InputError
 from lowalt.files.shipped import SHIPPED, shipped
-from lowalt.files.yaml_files import load_yaml
 from lowalt.workflow import status
 from lowalt.workflow.status import PLANNED_JOBS
 
@@ -62,7 +62,7 @@ def _refuse(options: argparse.Namespace) -> None:
             raise InputError(
                 f"configuration: no file at {path} (a rule or file to make is named by --target)"
             )
-        load_yaml(path)
+        read_layer(path, trains=True)
     if options.cores not in (None, "all") and not (
         options.cores.isdecimal() and int(options.cores)
     ):
@@ -80,8 +80,8 @@ def _refuse(options: argparse.Namespace) -> None:
 def command(options: argparse.Namespace) -> list[str]:
     """Return the command line of Snakemake.
 
-    Raises: InputError naming an overlay that is missing or no YAML mapping, wrong cores, a profile
-    that is not there, or where there is no Snakefile.
+    Raises: InputError naming an overlay that is missing, no YAML mapping, or of a run and names
+    code, wrong cores, a profile that is not there, or where there is no Snakefile.
     """
     _refuse(options)
     line = [sys.executable, "-m", "snakemake", "--snakefile", str(SNAKEFILE)]

@@ -17,7 +17,13 @@ from pathlib import Path
 from typing import Any
 
 from lowalt.files.atomic import text_of
-from lowalt.files.errors import InputError, InputWarning, lacking, shortened
+from lowalt.files.errors import (
+    InputError,
+    InputWarning,
+    in_plain_characters,
+    lacking,
+    shortened,
+)
 from lowalt.files.json_objects import json_object
 from lowalt.machine.memory import keep_freed_memory
 
@@ -122,10 +128,11 @@ def refusal(error: InputError | OSError | ImportError) -> str:
         return str(lacking(error))
     if error.errno not in REFUSED or error.filename is None:
         raise error
-    return shortened(
+    refused = (
         f"{error.filename}: {error.strerror}, expected a file or folder that this user may read "
         "or write"
     )
+    return shortened(in_plain_characters(refused))
 
 
 @contextlib.contextmanager
@@ -166,7 +173,14 @@ USUAL_FORMAT = warnings.formatwarning
 
 
 def warn_in_one_line() -> None:
-    """Print each InputWarning as one line, without the line of source that it comes from."""
+    """Print each InputWarning as one line, without the line of source that it comes from.
+
+    Warnings of libraries are not printed, unless `python -W` or PYTHONWARNINGS asks for warnings.
+    """
+    if not sys.warnoptions:
+        # What a library finds odd in a file stands in front of the sentence that says it.
+        warnings.simplefilter("ignore")
+        warnings.simplefilter("default", InputWarning)
 
     def in_one_line(message: Any, category: Any, *where: Any, **more: Any) -> str:
         """The text of a warning."""
