@@ -114,11 +114,10 @@ def _checked(layers: Sequence[Layer]) -> Kept:
 def _configuration(layers: Sequence[Layer]) -> dict:
     """The configuration of layers on the embedded default, or the whole one that they are."""
     schema = shipped(SCHEMA)
-    only = layers[0]
-    if len(layers) == 1 and isinstance(only, dict):
-        is_whole = set(load_yaml(schema)["required"]) <= set(only)
+    if len(layers) == 1 and isinstance(layers[0], dict):
+        is_whole = set(load_yaml(schema)["required"]) <= set(layers[0])
         if is_whole:
-            return check(copy.deepcopy(only), schema)
+            return check(copy.deepcopy(layers[0]), schema)
     return overlaid(layers)
 
 
