@@ -101,6 +101,4 @@ def short(value: object) -> object:
     """Return a float as text with six digits, None as an empty cell, and anything else as it is."""
     if value is None:
         return ""
-    if isinstance(value, float):
-        return f"{value:.6g}"
-    return value
+    return f"{value:.6g}" if isinstance(value, float) else value

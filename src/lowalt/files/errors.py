@@ -35,10 +35,9 @@ def shortened(text: str, longest: int = LONGEST) -> str:
     """
     if len(text) <= longest:
         return text
-    mark = " ... "
     start = 2 * longest // 3
-    end = longest - start - len(mark)
-    return text[:start] + mark + text[-end:]
+    end = longest - start - len(" ... ")
+    return f"{text[:start]} ... {text[-end:]}"
 
 
 def in_plain_characters(text: str) -> str:

@@ -19,17 +19,13 @@ def started(pid: int) -> int | None:
     """Return when a process started, in clock ticks after boot, or None if it is not running."""
     fields = _fields(pid)
     # A zombie process has ended; its parent has not read its exit status yet.
-    if fields is None or fields[0] in "ZX":
-        return None
-    return int(fields[19])
+    return None if fields is None or fields[0] in "ZX" else int(fields[19])
 
 
 def state(pid: int) -> str | None:
     """Return the state of a process as one letter, None without such a process or /proc."""
     fields = _fields(pid)
-    if fields is None:
-        return None
-    return fields[0]
+    return None if fields is None else fields[0]
 
 
 def _fields(pid: int) -> list[str] | None:

@@ -93,6 +93,4 @@ def _each(value: Any, rename: Callable[[str], str]) -> Any:
         return {name: _each(item, rename) for name, item in value.items()}
     if isinstance(value, list):
         return [_each(item, rename) for item in value]
-    if isinstance(value, str):
-        return rename(value)
-    return value
+    return rename(value) if isinstance(value, str) else value

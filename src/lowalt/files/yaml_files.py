@@ -89,9 +89,7 @@ def load_yaml(path: str | Path, what: str = "configuration", holds: str = "keys"
         loader.name = str(path)
         root = loader.get_single_node()
         _check_size(root, path)
-        value = None
-        if root is not None:
-            value = loader.construct_document(root)
+        value = None if root is None else loader.construct_document(root)
     except InputError:
         raise
     # PyYAML also raises errors of its converters, such as for month 99 of a date or a number of
