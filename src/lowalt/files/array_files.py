@@ -1,6 +1,4 @@
-"""Files of arrays (.npy, .npz) from users: the errors that damaged files raise, and limits of their
-stated size.
-"""
+"""Files of arrays (.npy, .npz) from users: errors of damaged files, limits of their stated size."""
 
 import struct
 import sys
@@ -57,8 +55,7 @@ def array_of(path: str | Path, what: str, mapped: bool = False) -> np.ndarray:
 
 
 def checked_archive(path: str | Path, what: str) -> Path:
-    """Return the path of a .npz whose members are arrays of plausible sizes, and whose texts are
-    texts.
+    """Return the path of a .npz whose members are arrays of plausible sizes, its texts valid.
 
     Raises: InputError naming the file where it is missing, is no archive, or has a member that
     would fill the memory, is not an array (NumPy would return bytes), or holds invalid characters
@@ -67,16 +64,18 @@ def checked_archive(path: str | Path, what: str) -> Path:
     path = existing(path, what)
     try:
         with zipfile.ZipFile(path) as archive:
-            large = next((member for member in archive.infolist() if _expands(member)), None)
-            for member in archive.infolist() if large is None else ():
-                with archive.open(member) as file:
-                    _check_array(file)
+            members = archive.infolist()
+            large = next((member for member in members if _expands(member)), None)
+            if large is None:
+                for member in members:
+                    with archive.open(member) as file:
+                        _check_array(file)
     except UNREADABLE as error:
         raise InputError(f"{path}: not a {what} file ({error})") from error
     if large:
         raise InputError(
-            f"{path}: {large.filename} says that {large.compress_size} bytes expand to {large.file_size}, "
-            f"expected at most {MOST_EXPANSION} times as many"
+            f"{path}: {large.filename} says that {large.compress_size} bytes expand to "
+            f"{large.file_size}, expected at most {MOST_EXPANSION} times as many"
         )
     return path
 
@@ -87,16 +86,14 @@ def _expands(member: zipfile.ZipInfo) -> bool:
 
 
 def _check_array(file: IO[bytes]) -> None:
-    """Read the header of a .npy file, and its characters where it holds text. Raises: errors of
-    UNREADABLE.
+    """Read the header of a .npy file, and its characters where it holds text.
+
+    Raises: errors of UNREADABLE.
     """
-    version = np.lib.format.read_magic(file)
-    header = (
-        np.lib.format.read_array_header_1_0
-        if version == (1, 0)
-        else np.lib.format.read_array_header_2_0
-    )
-    dtype = header(file)[2]
+    if np.lib.format.read_magic(file) == (1, 0):
+        _, _, dtype = np.lib.format.read_array_header_1_0(file)
+    else:
+        _, _, dtype = np.lib.format.read_array_header_2_0(file)
     if dtype.kind == "U":
         codes = np.frombuffer(file.read(), np.dtype("u4").newbyteorder(dtype.byteorder))
         if codes.max(initial=0) > sys.maxunicode:

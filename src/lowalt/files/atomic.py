@@ -23,8 +23,7 @@ full disk.
 
 @contextlib.contextmanager
 def replacing(path: str | Path, size: int | None = None) -> Iterator[Path]:
-    """Yield a temporary path next to `path` that replaces it only if the block ends without an
-    error.
+    """Yield a temporary path next to `path`, which replaces it if the block ends without an error.
 
     size: minimum size of the file (bytes), if known before it is written.
     Raises: SpaceError naming the file, the size and the free space where the disk is too small or
@@ -47,11 +46,10 @@ def replacing(path: str | Path, size: int | None = None) -> Iterator[Path]:
         if not _is_full(error, path):
             raise
         written = temporary.stat().st_size if temporary.exists() else 0
-        needed = (
-            f"{_megabytes(size)}"
-            if size is not None
-            else f"more than the {_megabytes(written)} written so far"
-        )
+        if size is None:
+            needed = f"more than the {_megabytes(written)} written so far"
+        else:
+            needed = _megabytes(size)
         free = _megabytes(free_bytes(path) + written)
         raise SpaceError(
             f"{path}: the disk is full; the file needs {needed}, {free} are free without it"
@@ -64,8 +62,10 @@ def replacing(path: str | Path, size: int | None = None) -> Iterator[Path]:
 
 def write_file(path: str | Path, content: str | bytes) -> None:
     """Write a whole file by `replacing`, text in UTF-8."""
+    if isinstance(content, str):
+        content = content.encode()
     with replacing(path) as temporary:
-        temporary.write_bytes(content.encode() if isinstance(content, str) else content)
+        temporary.write_bytes(content)
 
 
 def _sweep(path: Path) -> None:
@@ -79,8 +79,9 @@ def _sweep(path: Path) -> None:
 
 
 def free_bytes(path: str | Path) -> int:
-    """Return the bytes that this user may still write on the disk of `path`, which itself need not
-    exist.
+    """Return the bytes that this user may still write on the disk of `path`.
+
+    The path itself need not exist.
     """
     path = Path(path).absolute()
     while not path.exists():
@@ -126,9 +127,9 @@ def existing(path: str | Path, what: str) -> Path:
 
 @contextlib.contextmanager
 def text_file(path: str | Path, what: str) -> Iterator[TextIO]:
-    """Yield a file opened as UTF-8 text, with or without a byte order mark; line ends are left as
-    they are.
+    """Yield a file opened as UTF-8 text, with or without a byte order mark.
 
+    Line ends are left as they are.
     Raises: InputError naming `what` and the path where there is no such file, it is no UTF-8, or no
     CSV where it is read as CSV.
     """
@@ -149,6 +150,8 @@ def text_of(path: str | Path, what: str) -> str:
 
 
 def slug(name: str) -> str:
-    """Return the file name of a subtype or scheme: lower case, runs of other characters than
-    letters and digits as one "-"."""
+    """Return the file name of a subtype or scheme.
+
+    It is in lower case; each run of characters other than letters and digits is one "-".
+    """
     return re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-")

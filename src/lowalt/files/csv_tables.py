@@ -60,8 +60,9 @@ def _refuse_compressed(path: str | Path, what: str) -> None:
 
 
 def number(row: Mapping[str, str], column: str, path: str | Path) -> float:
-    """Return a cell of a table of texts as a finite number. Raises: InputError naming the file,
-    column and cell.
+    """Return a cell of a table of texts as a finite number.
+
+    Raises: InputError naming the file, column and cell.
     """
     try:
         value = float(row[column])
@@ -73,17 +74,19 @@ def number(row: Mapping[str, str], column: str, path: str | Path) -> float:
 
 
 def write_csv(path: str | Path, columns: Sequence[str], rows: Iterable[Mapping | Sequence]) -> None:
-    """Write a header of `columns` and the rows: sequences of cells, or dicts, whose missing keys
-    become empty cells.
+    """Write a header of `columns` and the rows: sequences of cells, or dicts by column.
 
-    Cells are written by `str`, None as an empty cell. The file appears only when it is complete.
+    A key that a dict lacks becomes an empty cell. Cells are written by `str`, None as an empty
+    cell. The file appears only when it is complete.
     Raises: InputError naming the file and the keys of a dict that are no columns.
     """
     with replacing(path) as temporary, temporary.open("w", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(columns)
         for row in rows:
-            writer.writerow(_cells(path, columns, row) if isinstance(row, Mapping) else row)
+            if isinstance(row, Mapping):
+                row = _cells(path, columns, row)
+            writer.writerow(row)
 
 
 def _cells(path: str | Path, columns: Sequence[str], row: Mapping) -> list:

@@ -1,6 +1,4 @@
-"""Strict reader of untrusted JSON objects (RFC 8259, limited nesting); anything else is refused in
-one sentence.
-"""
+"""Strict reader of untrusted JSON objects (RFC 8259, limited nesting), which refuses the rest."""
 
 import json
 import math
@@ -19,7 +17,9 @@ def _no_number(text: str) -> NoReturn:
 def _finite(text: str) -> float:
     """Return the number in a text. Raises: ValueError for one beyond float64, such as 1e400."""
     value = float(text)
-    return value if math.isfinite(value) else _no_number(text)
+    if not math.isfinite(value):
+        _no_number(text)
+    return value
 
 
 def json_object(text: str, where: str | Path, what: str) -> dict:

@@ -1,5 +1,6 @@
 """Strict reader of YAML files (configuration, records): a mapping without duplicate keys."""
 
+import itertools
 from pathlib import Path
 
 import yaml
@@ -9,7 +10,7 @@ from lowalt.files.errors import InputError, in_one_line
 
 
 class _UniqueKeys:
-    """Safe YAML loader in which a duplicate key is an error; `name` is the file's name in messages."""
+    """Safe YAML loader that refuses duplicate keys; `name` is the file's name in messages."""
 
     name: str
 
@@ -35,62 +36,51 @@ class _Loader(_UniqueKeys, yaml.SafeLoader):
 
 
 class _FastLoader(_UniqueKeys, getattr(yaml, "CSafeLoader", yaml.SafeLoader)):  # type: ignore[misc]
-    """libyaml's parser, seven times as fast. It is recursive, so a million nesting levels would
-    crash the process.
+    """libyaml's parser, which is seven times as fast.
+
+    It is recursive, so a million nesting levels would crash the process.
     """
 
 
 DEEPEST = 10_000
-"""Limit on characters that can open a nesting level; a text with more of them is read by the Python
-parser.
-"""
-
+"""The Python parser reads a text in which more characters than this can open a nesting level."""
 
 MOST_NODES = 1_000_000
-"""Limit on the values of a file after the expansion of anchors: ten lines can expand to billions.
-"""
+"""Limit on the values of a file after the expansion of anchors: ten lines can make billions."""
 
 TEMPLATE = "__use_yte__"
-"""The key with which a configuration asks Snakemake's reader to run the Python expressions in it.
-"""
+"""The key that asks Snakemake's reader to run the Python expressions in a configuration."""
 
 
 def _check_size(root: yaml.Node | None, path: str | Path) -> None:
-    """Refuse a document whose anchors make more than MOST_NODES values, or make a value contain
-    itself.
-    """
+    """Refuse anchors that make more than MOST_NODES values, or a value that contains itself."""
     sizes: dict[int, int] = {}
 
     def size(node: yaml.Node | None) -> int:
-        """Number of values in a node after the expansion of anchors; counting stops beyond
-        MOST_NODES.
-        """
+        """Number of values in a node after the expansion of anchors."""
         if not isinstance(node, yaml.CollectionNode):
             return 1
         if id(node) not in sizes:
-            sizes[id(node)] = (
-                MOST_NODES + 1
-            )  # until the node is counted; a node inside itself is endless
-            pairs = (
-                node.value
-                if isinstance(node, yaml.MappingNode)
-                else [(entry,) for entry in node.value]
-            )
-            sizes[id(node)] = 1 + sum(size(entry) for pair in pairs for entry in pair)
+            # A node that is met inside itself is endless.
+            sizes[id(node)] = MOST_NODES + 1
+            inner = node.value
+            if isinstance(node, yaml.MappingNode):
+                inner = itertools.chain.from_iterable(node.value)
+            sizes[id(node)] = 1 + sum(map(size, inner))
         return sizes[id(node)]
 
     if size(root) > MOST_NODES:
         raise InputError(
-            f"{path}: its anchors make more than {MOST_NODES} values of it, expected a plain document"
+            f"{path}: its anchors make more than {MOST_NODES} values of it, expected a plain "
+            "document"
         )
 
 
 def load_yaml(path: str | Path, what: str = "configuration", holds: str = "keys") -> dict:
-    """Return the mapping in a YAML file; `what` and `holds` name the file and its entries in
-    messages.
+    """Return the mapping in a YAML file.
 
-    Raises: InputError naming the file where it is missing, not YAML, no mapping, a template, or has
-    a key twice.
+    what, holds: the file and its entries in words, for messages. Raises: InputError naming the file
+    where it is missing, not YAML, no mapping, a template, or has a key twice.
     """
     text = text_of(path, what)
     try:

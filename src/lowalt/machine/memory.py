@@ -14,9 +14,9 @@ from pathlib import Path
 
 @contextlib.contextmanager
 def at_most(size: int) -> Iterator[None]:
-    """Let a block of code take at most `size` more bytes of address space; an allocation beyond
-    that fails.
+    """Let a block of code take at most `size` more bytes of address space.
 
+    An allocation beyond that fails.
     Systems without /proc set no limit. Source: setrlimit(2), RLIMIT_AS; proc(5), statm.
     """
     statm = Path("/proc/self/statm")

@@ -1,5 +1,4 @@
-"""Checkpoints: written atomically. A damaged checkpoint, or one of another run, is refused with an
-error.
+"""Checkpoints, written atomically; a damaged one, or one of another run, is refused.
 
 A file holds {"identity": JSON text, "digest": SHA-256 of every tensor, ...state}. The identity
 holds everything that determines the weights (settings, scheme, protocol, samples). A training
@@ -102,15 +101,15 @@ def load(path: str | Path, name: str | None = None) -> tuple[str, dict]:
 
 
 def check_model(facts: dict, settings: dict, path: str | Path) -> None:
-    """Refuse a model file whose settings are wrong, or contradict the identity under which it was
-    trained.
+    """Refuse a model file whose settings are wrong or contradict the identity of its training.
 
     facts: its identity; settings: of its network; path: the file. Raises: InputError naming the
     setting that is wrong.
     """
     check_brought("model", settings, path)
     trained = facts.get("settings")
-    trained = trained if isinstance(trained, dict) else {}
+    if not isinstance(trained, dict):
+        trained = {}
     named = {
         "network": trained,
         "size": trained,

@@ -1,5 +1,4 @@
-"""The sample table of a shard: `{shard}.npz` next to `{shard}.tar`, one row per sample, and the
-shard's own header.
+"""The sample table of a shard, `{shard}.npz` next to `{shard}.tar`: a row per sample, a header.
 
     header    str, JSON: name, kind, group, fold, samples, bytes, sha256
     samples   (n,) structured, in the order of the tar (offsets and sizes in bytes)
@@ -50,10 +49,9 @@ def table_path(shard: str | Path) -> Path:
 
 def write(path: str | Path, header: dict, samples: np.ndarray) -> None:
     """Write header and rows; equal content, equal bytes."""
+    text = np.array(json.dumps(header, sort_keys=True))
     with replacing(path) as temporary:
-        write_arrays(
-            temporary, {"header": np.array(json.dumps(header, sort_keys=True)), "samples": samples}
-        )
+        write_arrays(temporary, {"header": text, "samples": samples})
 
 
 def read_header(path: str | Path) -> dict:
