@@ -47,9 +47,7 @@ def json_object(text: str, where: str | Path, what: str) -> dict:
     if sum(map(text.count, "[{,")) > MOST_VALUES:
         raise InputError(f"{where}: more than {MOST_VALUES} values, expected {what} with fewer")
     try:
-        value = json.loads(
-            text, parse_constant=_no_number, parse_float=_finite, parse_int=_whole
-        )
+        value = json.loads(text, parse_constant=_no_number, parse_float=_finite, parse_int=_whole)
     except RecursionError:
         raise InputError(f"{where}: not {what} (values stand in each other too deeply)") from None
     except ValueError as error:

@@ -33,7 +33,6 @@ class _UniqueKeys:
             seen.add(key)
         return super().construct_mapping(node, deep)  # type: ignore[misc]
 
-
     def construct_yaml_int(self, node: yaml.ScalarNode) -> int:
         """Return the whole number as the library does.
 
