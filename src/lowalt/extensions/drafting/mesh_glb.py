@@ -14,10 +14,11 @@ from pathlib import Path
 import numpy as np
 
 from lowalt.extensions.drafting.mesh_ply import stripped
+from lowalt.files.atomic import bytes_of
 from lowalt.files.errors import InputError
 from lowalt.files.json_objects import json_object
 from lowalt.numerics import portable
-from lowalt.targets.mesh_polygons import Piece
+from lowalt.targets.mesh_polygons import MOST_MESH_BYTES, Piece, refuse_many
 
 TYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
@@ -26,7 +27,9 @@ COMPRESSED = {
     "EXT_meshopt_compression": "meshopt",
     "KHR_meshopt_compression": "meshopt",
 }
-MOST_VALUES = 200_000_000
+OF_TRIANGLE = 6
+"""Numbers of a triangle: three corners, and half a vertex of three numbers."""
+MOST_NODES = 100_000
 METRES = 1.0
 """Metres of the unit of the format. Source: glTF 2.0, section 3.4."""
 UP = "y"
@@ -44,20 +47,40 @@ class _Glb:
             raise ValueError("expected a binary glTF of version 2")
         self.json = json_object(data[20 : 20 + size].decode(), "its JSON", "glTF")
         self.binary = data[28 + size :]
+        self.embedded: dict[int, bytes] = {}
+        self.size = len(data)
+        self.values = 0
+        if len(self.list("nodes")) > MOST_NODES:
+            raise ValueError(f"{len(self.list('nodes'))} nodes, expected at most {MOST_NODES}")
+
+    def count(self, values: int) -> None:
+        """Count numbers before they are made, however often one surface is shown.
+
+        Raises: InputError for too many.
+        """
+        self.values += values
+        refuse_many(self.values // OF_TRIANGLE, self.size // OF_TRIANGLE)
 
     def list(self, name: str) -> list:
         """A list of the file's JSON, empty where it has none."""
         return self.json.get(name, [])
 
-    def _view(self, index: int, kind: str, width: int, count: int, offset: int) -> np.ndarray:
-        """`count` elements of `width` numbers of a buffer view, as they are stored."""
-        view = self.list("bufferViews")[_natural(index)]
-        data = self.binary
-        if uri := self.list("buffers")[_natural(view["buffer"])].get("uri"):
+    def _buffer(self, index: int) -> bytes:
+        """The bytes of a buffer: those behind the JSON, or those in it."""
+        uri = self.list("buffers")[index].get("uri")
+        if not uri:
+            return self.binary
+        if index not in self.embedded:
             head, _, text = uri.partition(";base64,")
             if not head.startswith("data:"):
                 raise ValueError("its data lies in another file, expected all in one")
-            data = base64.b64decode(text)
+            self.embedded[index] = base64.b64decode(text)
+        return self.embedded[index]
+
+    def _view(self, index: int, kind: str, width: int, count: int, offset: int) -> np.ndarray:
+        """`count` elements of `width` numbers of a buffer view, as they are stored."""
+        view = self.list("bufferViews")[_natural(index)]
+        data = self._buffer(_natural(view["buffer"]))
         start = _natural(view.get("byteOffset", 0))
         length = _natural(view["byteLength"])
         data = data[start : start + length]
@@ -73,8 +96,7 @@ class _Glb:
         kind = TYPES[accessor["componentType"]]
         width = WIDTHS[accessor["type"]]
         count = _natural(accessor["count"])
-        if count * width > MOST_VALUES:
-            raise ValueError(f"an array of {count * width} numbers, expected at most {MOST_VALUES}")
+        self.count(count * width)
         if "bufferView" in accessor:
             offset = _natural(accessor.get("byteOffset", 0))
             values = self._view(accessor["bufferView"], kind, width, count, offset).copy()
@@ -83,6 +105,7 @@ class _Glb:
         if sparse := accessor.get("sparse"):
             at = sparse["indices"]
             new = sparse["values"]
+            self.count(_natural(sparse["count"]) * width)
             rows = self._view(
                 at["bufferView"],
                 TYPES[at["componentType"]],
@@ -140,6 +163,7 @@ class _Glb:
         does not count.
         """
         joints = skin["joints"]
+        self.count(16 * len(joints))
         attributes = primitive["attributes"]
         bind = np.tile(np.eye(4), (len(joints), 1, 1))
         if "inverseBindMatrices" in skin:
@@ -239,7 +263,7 @@ def pieces(path: Path) -> list[Piece]:
     Raises: InputError where the file is compressed, or its data lies elsewhere; other exceptions
     for a damaged file.
     """
-    glb = _Glb(path.read_bytes())
+    glb = _Glb(bytes_of(path, "mesh", MOST_MESH_BYTES))
     for name, word in COMPRESSED.items():
         if name in glb.list("extensionsRequired"):
             raise InputError(
@@ -269,10 +293,7 @@ def pieces(path: Path) -> list[Piece]:
                 pieces.append(replace(piece, vertices=glb.skinned(points, primitive, skin, places)))
                 continue
             instances = _instances(glb, node)
-            if len(instances) * max(piece.faces.size, piece.vertices.size) > MOST_VALUES:
-                raise ValueError(
-                    f"{len(instances)} instances of {len(piece.faces)} triangles, expected fewer"
-                )
+            glb.count((len(instances) - 1) * (piece.faces.size + piece.vertices.size))
             for instance, within in enumerate(instances):
                 at = portable.product(place, within)
                 names = (f"{name} instance {instance}",) if len(instances) > 1 else ()

@@ -22,7 +22,6 @@ from lowalt.extensions.drafting.robot_geometry import (
     numbers,
     place_of,
     primitive,
-    shown,
 )
 from lowalt.extensions.drafting.robot_mjcf import mjcf
 from lowalt.files.errors import InputError, reading
@@ -252,7 +251,7 @@ class _Links:
         )
         for name, link, base in self.links:
             self.robot.surfaces[name] = [
-                shown(
+                self.files.shown(
                     _geometry(view.find("geometry"), base, self.files),
                     portable.product(self.place(name), _pose(view)),
                 )

@@ -118,7 +118,7 @@ class _Mjcf:
             # Lengths are halves here.
             whole = {"box": 2 * size, "sphere": size[:1], "ellipsoid": size}
             triangles = primitive(kind, whole[kind] if kind in whole else size * [1, 2])
-        return shown(triangles, portable.product(above, place))
+        return self.files.shown(triangles, portable.product(above, place))
 
     def body(
         self, element: Element, parent: str, above: np.ndarray, childclass: str, depth: int
