@@ -154,8 +154,10 @@ def refusing() -> Iterator[None]:
     a missing package into one line and status 2.
     """
     try:
-        yield
-        sys.stdout.flush()
+        try:
+            yield
+        finally:
+            sys.stdout.flush()
     except REFUSALS as error:
         if isinstance(error, OSError) and error.errno in FULL:
             drop_output()

@@ -6,7 +6,7 @@ from pathlib import Path
 import yaml
 
 from lowalt.files.atomic import text_of
-from lowalt.files.errors import InputError, in_one_line, shown
+from lowalt.files.errors import InputError, in_one_line
 from lowalt.files.json_objects import MOST_BITS
 
 
@@ -44,7 +44,10 @@ class _UniqueKeys:
         if fits:
             value = super().construct_yaml_int(node)  # type: ignore[misc]
         if not fits or value.bit_length() > MOST_BITS:
-            raise ValueError(f"{shown(node.value)}, expected a number of at most {MOST_BITS} bits")
+            raise ValueError(
+                f"{node.value[:20]!r}, {len(node.value)} characters, expected a whole number of at "
+                f"most {MOST_BITS} bits"
+            )
         return value
 
 

@@ -29,7 +29,8 @@ COMPRESSED = {
 }
 OF_TRIANGLE = 6
 """Numbers of a triangle: three corners, and half a vertex of three numbers."""
-MOST_NODES = 100_000
+OF_PLACE = 200
+"""Numbers that take as long as the place of a node or of an instance."""
 METRES = 1.0
 """Metres of the unit of the format. Source: glTF 2.0, section 3.4."""
 UP = "y"
@@ -50,8 +51,7 @@ class _Glb:
         self.embedded: dict[int, bytes] = {}
         self.size = len(data)
         self.values = 0
-        if len(self.list("nodes")) > MOST_NODES:
-            raise ValueError(f"{len(self.list('nodes'))} nodes, expected at most {MOST_NODES}")
+        self.count(OF_PLACE * len(self.list("nodes")))
 
     def count(self, values: int) -> None:
         """Count numbers before they are made, however often one surface is shown.
@@ -252,6 +252,7 @@ def _instances(glb: _Glb, node: dict) -> list[np.ndarray]:
     }
     if not columns:
         return [np.eye(4)]
+    glb.count(OF_PLACE * max(map(len, columns.values())))
     return [
         _local(dict(zip(columns, row, strict=True))) for row in zip(*columns.values(), strict=True)
     ]

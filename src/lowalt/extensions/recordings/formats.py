@@ -103,7 +103,7 @@ def _wav(path: Path, record: Record) -> Table:
     except (UnboundLocalError, ZeroDivisionError) as error:
         # scipy's reader ends so where a file states no format or channel, or holds no data.
         raise InputError(
-            f"{path}: a .wav file without a format, a channel or samples, expected a recording"
+            f"{path}: a .wav file without a format or without samples, or of no channel"
         ) from error
     return Table([values] if values.ndim == 1 else list(values.T), rate_hz=float(rate))
 
