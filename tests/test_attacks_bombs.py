@@ -73,6 +73,7 @@ class Bomb(NamedTuple):
 
 
 YAML_PARTS = "a: " + "1:" * 20_000 + "1"
+BVH = "HIERARCHY ROOT a { OFFSET 0 0 0 CHANNELS 0 }"
 ROWS = [
     Bomb("a.yaml", YAML_PARTS, load_yaml, "not YAML .*expected a whole number of at most 64 bits"),
     Bomb("b.yaml", "a: 0x" + "f" * 4000, load_yaml, "expected a whole number of at most 64 bits"),
@@ -98,6 +99,7 @@ ROWS = [
         "b.dae", bombs.collada_of_nodes(40).replace("#n38", "#n39"), mesh, "more than 20000.. tri"
     ),
     Bomb("a.stl", bytes(80) + struct.pack("<I", 2**31) + bytes(99), mesh, "ends after 1, expected"),
+    Bomb("a.bvh", BVH + "MOTION\nFrames: 9999999\nFrame Time: 0.01\n", read_bvh, "too many joints"),
     Bomb("a.asf", lambda: ":" * 3_000_000, read_skeleton, "a line of more than 1048576"),
 ]
 

@@ -70,6 +70,12 @@ def robot_of_one_mesh(path: Path) -> None:
     path.write_text(f'<robot name="a"><link name="b">{visual * 700}</link></robot>')
 
 
+def array_of_axes(path: Path) -> None:
+    """Write an array of one long axis and many short ones."""
+    rng = np.random.default_rng(1)
+    np.save(path, rng.integers(0, 99, (65, 12, 12, 12, 12)).astype(np.int8))
+
+
 POINTS = {"componentType": 5126, "type": "VEC3", "count": 3_000_000}
 SHOWN = {"scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}]}
 PRIMITIVE = {"attributes": {"POSITION": 0}}
@@ -121,6 +127,7 @@ ROWS = [
     Bomb("b.csv", lambda: "1," * 200_000 + "1\n", inspect_recording, "200001 columns, expected"),
     Bomb("c.csv", lambda: "1" * 3_000_000, recording, "a line of more than 1048576 characters"),
     Bomb("d.csv", "a\n" + "1" * 30, inspect_recording, "nothing in it reads as a signal"),
+    Bomb("a.npy", array_of_axes, inspect_recording, "nothing in it reads as a signal", True),
     Bomb("a.wav", bombs.wav(0, b"", 0), recording, "or of no channel"),
     Bomb("b.wav", bombs.wav(0, b"", 0), inspect_recording, "or of no channel"),
     Bomb("a.geojson", lambda: bombs.town(bombs.outline(60_000, 1.0)), buildings, "60001 corners"),

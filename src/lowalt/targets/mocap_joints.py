@@ -63,6 +63,9 @@ BEYOND = {"wrist": 0.1, "hand": 0.35, "fingers": 0.6, "thumb": 0.35}
 RATES = ("mocap_framerate", "mocap_frame_rate", "fps")
 """Names of a frame rate (Hz) in an .npz file, the surest first."""
 MOST_NUMBERS = 100_000_000
+FREE_NUMBERS = 3_000_000
+MOST_EXPANSION = 100
+"""Numbers of positions and turns that a file may make: this many, or so many times its own."""
 MOST_BVH_BYTES = 256 << 20
 
 
@@ -224,8 +227,10 @@ def _followed(joints: list[_Joint], values: np.ndarray) -> dict[str, np.ndarray]
     """Return the positions (F, 3) of joints, parents first, from their channels (F, C)."""
     twice = len({joint.name for joint in joints}) < len(joints)
     numbers = len(joints) * len(values) * 9  # a rotation (3, 3) of each joint in each frame
-    if twice or numbers > MOST_NUMBERS:
-        raise ValueError("a joint that stands twice, or too many frames")
+    # Ends of chains have no numbers of their own in the file.
+    most = min(MOST_NUMBERS, max(FREE_NUMBERS, MOST_EXPANSION * values.size))
+    if twice or numbers > most:
+        raise ValueError("a joint that stands twice, or too many joints and frames")
     positions: dict[str, np.ndarray] = {}
     turns: dict[str, np.ndarray] = {}
     column = 0

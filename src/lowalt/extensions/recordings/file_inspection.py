@@ -253,6 +253,8 @@ def _candidates(
             columns = (
                 array.reshape(len(array), -1) if array.shape[0] >= array.shape[-1] else array.T
             )
+            if long < 2 and columns.shape[1] > MOST_COLUMNS:
+                continue
             found = _of_chirps(array) if long >= 2 else _of_columns(Table(list(columns.T)))
             result += [one._replace(keys={**keys, **one.keys}) for one in found]
     else:
