@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+import torch
 
 import bombs
 from lowalt.files.array_files import array_of
@@ -21,8 +22,8 @@ from lowalt.files.errors import InputError
 from lowalt.files.json_objects import read_object
 from lowalt.files.yaml_files import load_yaml
 from lowalt.motion.table import read_table
-from lowalt.recognition import predictions
-from lowalt.shards import index, sample_table, verify
+from lowalt.recognition import checkpoint, predictions
+from lowalt.shards import index, kept_datasets, sample_table, verify
 from lowalt.targets import mesh_collada
 from lowalt.targets.cloud import read as read_cloud
 from lowalt.targets.mesh_files import read_mesh
@@ -216,3 +217,32 @@ def test_an_index_of_more_samples_than_a_table_holds_is_refused(tmp_path):
             continue
         with pytest.raises(InputError, match=rf"index\.json: .*{expected}"):
             index.load(tmp_path / "index.json")
+
+
+def test_a_checkpoint_of_lists_within_lists_is_refused(tmp_path):
+    state = [1.0]
+    for _ in range(40):
+        state = [state, state]
+    torch.save({"identity": "{}", "digest": "", "state": state}, tmp_path / "a.pt")
+    said = bombs.refusal_of(lambda: checkpoint.load(tmp_path / "a.pt"))
+    assert said.startswith(f"{tmp_path}/a.pt: not a checkpoint (values of more than 67108864 bytes")
+
+
+def test_a_checkpoint_that_is_compressed_beyond_measure_is_refused(tmp_path):
+    checkpoint.save(tmp_path / "a.pt", "{}", {"a": torch.zeros(17 << 20)})
+    with (
+        zipfile.ZipFile(tmp_path / "a.pt") as old,
+        zipfile.ZipFile(tmp_path / "b.pt", "w", zipfile.ZIP_DEFLATED, compresslevel=1) as new,
+    ):
+        for name in old.namelist():
+            new.writestr(name, old.read(name))
+    said = bombs.refusal_of(lambda: checkpoint.load(tmp_path / "b.pt"))
+    assert "b.pt: not a checkpoint (its members expand to more than 67108864 bytes" in said
+
+
+def test_a_configuration_that_names_a_pipe_or_a_device_is_not_read_from_it(tmp_path):
+    bombs.pipe(tmp_path / "pipe")
+    (tmp_path / "file").write_text("a")
+    assert kept_datasets._state(tmp_path / "file") is not None
+    for path in (tmp_path / "pipe", Path("/dev/zero"), tmp_path):
+        assert kept_datasets._state(path) is None
