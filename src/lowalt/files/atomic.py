@@ -162,7 +162,7 @@ def bytes_of(path: str | Path, what: str, most_bytes: int) -> bytes:
 class _Lines(io.TextIOWrapper):
     """A text whose lines are bounded: one that never ends would fill the memory."""
 
-    def __next__(self) -> str:
+    def __next__(self) -> str:  # type: ignore[override]
         """Return the next line. Raises: InputError naming the file for a longer one."""
         line = self.readline(LONGEST_LINE + 1)
         if not line:

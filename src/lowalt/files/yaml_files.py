@@ -62,7 +62,7 @@ class _FastLoader(_UniqueKeys, getattr(yaml, "CSafeLoader", yaml.SafeLoader)):  
 
 
 for _kind in (_Loader, _FastLoader):
-    _kind.add_constructor("tag:yaml.org,2002:int", _kind.construct_yaml_int)
+    _kind.add_constructor("tag:yaml.org,2002:int", _kind.construct_yaml_int)  # type: ignore[type-var]
 
 
 DEEPEST = 10_000

@@ -84,10 +84,10 @@ def map_samples(path: str | Path) -> np.ndarray:
     places = np.stack([samples[name] for name in ("offset", "record_offset", "data_offset")])
     sizes = np.stack([samples[name] for name in ("size", "record_size", "data_size")])
     wrong = (places < 0) | (places > LARGEST_OFFSET) | (sizes < 0) | (sizes > LARGEST_SAMPLE)
-    wrong = wrong.any(axis=0)
-    if wrong.any():
+    rows = np.flatnonzero(wrong.any(axis=0))
+    if len(rows):
         raise InputError(
-            f"{path}: row {int(wrong.argmax())} has a place or a size of a sample in its shard that "
+            f"{path}: row {rows[0]} has a place or a size of a sample in its shard that "
             f"no sample has, expected sizes from 0 to {LARGEST_SAMPLE} bytes"
         )
     return samples
