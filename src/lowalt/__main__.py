@@ -15,7 +15,7 @@ from lowalt.config.command import REFUSALS, drop_output, refusal, warn_in_one_li
 from lowalt.config.core_commands import CORE_COMMANDS, Command
 from lowalt.config.extensions import extensions_in_words, function_offered
 from lowalt.files.atomic import FULL
-from lowalt.files.errors import InputError
+from lowalt.files.errors import InputError, in_plain_characters
 from lowalt.machine.memory import refuse_little
 
 
@@ -96,7 +96,7 @@ def _acted(words: list[str]) -> int:
 
         text = as_json(answer.facts)
     if text:
-        print(text)
+        print(in_plain_characters(text))
     sys.stdout.flush()
     return answer.status
 
