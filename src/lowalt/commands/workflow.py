@@ -14,6 +14,7 @@ from lowalt.config.command import exit_status
 from lowalt.config.layers import read_layer
 from lowalt.files.errors import InputError
 from lowalt.files.shipped import SHIPPED, shipped
+from lowalt.machine.run_pipe import hold_pipe
 from lowalt.workflow import status
 from lowalt.workflow.status import PLANNED_JOBS
 
@@ -116,12 +117,14 @@ def ended(options: argparse.Namespace) -> dict:
     Raises: as `command`.
     """
     line = command(options)
+    pipe = hold_pipe()
     if not options.json:
-        return {"status": exit_status(subprocess.run(line).returncode)}
+        return {"status": exit_status(subprocess.run(line, pass_fds=[pipe]).returncode)}
     begun = time.time()
     with tempfile.TemporaryDirectory() as folder:
         jobs = Path(folder, "jobs")
-        ran = subprocess.run(line, stdout=2, env=os.environ | {PLANNED_JOBS: str(jobs)})
+        environment = os.environ | {PLANNED_JOBS: str(jobs)}
+        ran = subprocess.run(line, stdout=2, env=environment, pass_fds=[pipe])
         planned = []
         if jobs.exists():
             planned = [json.loads(text) for text in jobs.read_text().splitlines()]

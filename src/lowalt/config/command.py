@@ -9,6 +9,7 @@ import argparse
 import contextlib
 import errno
 import functools
+import os
 import resource
 import sys
 import warnings
@@ -16,16 +17,18 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from lowalt.files.atomic import text_of
+from lowalt.files.atomic import FULL, text_of
 from lowalt.files.errors import (
     InputError,
     InputWarning,
+    in_one_line,
     in_plain_characters,
     lacking,
     shortened,
 )
 from lowalt.files.json_objects import json_object
 from lowalt.machine.memory import keep_freed_memory
+from lowalt.machine.run_pipe import end_with_starter
 
 
 def exit_status(code: int) -> int:
@@ -116,12 +119,21 @@ REFUSED = (
 """Operating system errors caused by a path of the user, such as a read-only folder."""
 
 
-def refusal(error: InputError | OSError | ImportError) -> str:
+REFUSALS = (InputError, OSError, ImportError, MemoryError)
+"""Errors that become one sentence, as far as `refusal` knows them."""
+
+
+def refusal(error: InputError | OSError | ImportError | MemoryError) -> str:
     """Return the message of a refusal, of bounded length.
 
-    It is that of an InputError, one about the path in an error of the operating system, or one
-    about a package that is not installed. Raises: any other error unchanged.
+    It is that of an InputError, one about the path in an error of the operating system, about a
+    full disk or output, about memory, or about a package that is not installed. Raises: any other
+    error unchanged.
     """
+    if isinstance(error, MemoryError):
+        return f"memory: not enough ({in_one_line(error)}), expected more of it, or a smaller input"
+    if isinstance(error, OSError) and error.errno in FULL:
+        return f"{error.filename or 'standard output'}: {error.strerror}, expected room to write"
     if isinstance(error, InputError):
         return str(error)
     if isinstance(error, ImportError):
@@ -135,12 +147,24 @@ def refusal(error: InputError | OSError | ImportError) -> str:
     return shortened(in_plain_characters(refused))
 
 
+def drop_output() -> None:
+    """Let what is still to be written on standard output go nowhere: Python would try again when it
+    ends.
+    """
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
 @contextlib.contextmanager
 def refusing() -> Iterator[None]:
-    """Turn an InputError, an error about a path, or a missing package into a line and status 2."""
+    """Turn what `refusal` knows, such as an InputError or a full output, into a line and status 2."""
     try:
-        yield
-    except (InputError, OSError, ImportError) as error:
+        try:
+            yield
+        finally:
+            sys.stdout.flush()
+    except REFUSALS as error:
+        if isinstance(error, OSError) and error.errno in FULL:
+            drop_output()
         print(f"error: {refusal(error)}", file=sys.stderr)
         raise SystemExit(2) from None
 
@@ -193,6 +217,7 @@ def warn_in_one_line() -> None:
 
 def run(main: Callable[[list[str]], None]) -> None:
     """Run a stage's `main` on the process's arguments; errors and warnings become one line."""
+    end_with_starter()
     keep_freed_memory()
     warn_in_one_line()
     with refusing():

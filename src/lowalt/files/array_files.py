@@ -1,5 +1,6 @@
 """Files of arrays (.npy, .npz) from users: errors of damaged files, limits of their stated size."""
 
+import math
 import struct
 import sys
 import tokenize
@@ -46,7 +47,10 @@ def array_of(path: str | Path, what: str, mapped: bool = False) -> np.ndarray:
     """
     path = existing(path, what)
     try:
-        array = np.load(path, mmap_mode="r" if mapped else None, allow_pickle=False)
+        # A map first: its size is compared with that of the file before memory is asked for.
+        array = np.load(path, mmap_mode="r", allow_pickle=False)
+        if not mapped and isinstance(array, np.memmap):
+            array = np.array(array)
     except UNREADABLE as error:
         raise InputError(f"{path}: not a whole {what} file ({error})") from error
     if not isinstance(array, np.ndarray):
@@ -66,10 +70,12 @@ def checked_archive(path: str | Path, what: str) -> Path:
         with zipfile.ZipFile(path) as archive:
             members = archive.infolist()
             large = next((member for member in members if _expands(member)), None)
-            if large is None:
+            total = sum(member.file_size for member in members)
+            whole = total <= most_expanded(path.stat().st_size)
+            if large is None and whole:
                 for member in members:
                     with archive.open(member) as file:
-                        _check_array(file)
+                        _check_array(file, member.file_size)
     except UNREADABLE as error:
         raise InputError(f"{path}: not a {what} file ({error})") from error
     if large:
@@ -77,23 +83,35 @@ def checked_archive(path: str | Path, what: str) -> Path:
             f"{path}: {large.filename} says that {large.compress_size} bytes expand to "
             f"{large.file_size}, expected at most {MOST_EXPANSION} times as many"
         )
+    if not whole:
+        raise InputError(
+            f"{path}: {len(members)} members of {total} bytes in all, expected at most "
+            f"{MOST_EXPANSION} times as many as the file has"
+        )
     return path
+
+
+def most_expanded(size: int) -> int:
+    """Return how many bytes a compressed file or member of `size` bytes may expand to."""
+    return max(FREE_BYTES, MOST_EXPANSION * size)
 
 
 def _expands(member: zipfile.ZipInfo) -> bool:
     """Whether the stated size of an archive's member would fill the memory."""
-    return member.file_size > max(FREE_BYTES, MOST_EXPANSION * member.compress_size)
+    return member.file_size > most_expanded(member.compress_size)
 
 
-def _check_array(file: IO[bytes]) -> None:
-    """Read the header of a .npy file, and its characters where it holds text.
+def _check_array(file: IO[bytes], size: int) -> None:
+    """Read the header of a .npy file of `size` bytes, and its characters where it holds text.
 
     Raises: errors of UNREADABLE.
     """
     if np.lib.format.read_magic(file) == (1, 0):
-        _, _, dtype = np.lib.format.read_array_header_1_0(file)
+        shape, _, dtype = np.lib.format.read_array_header_1_0(file)
     else:
-        _, _, dtype = np.lib.format.read_array_header_2_0(file)
+        shape, _, dtype = np.lib.format.read_array_header_2_0(file)
+    if math.prod(shape) * dtype.itemsize > size:
+        raise ValueError(f"an array {shape} of {dtype} is longer than its {size} bytes")
     if dtype.kind == "U":
         codes = np.frombuffer(file.read(), np.dtype("u4").newbyteorder(dtype.byteorder))
         if codes.max(initial=0) > sys.maxunicode:

@@ -9,6 +9,7 @@ import copy
 import hashlib
 import json
 import os
+import stat
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -95,6 +96,8 @@ def _state(path: Path) -> object:
     """What tells a file's content from another: its SHA-256, or size and time; None without it."""
     try:
         about = path.stat()
+        if not stat.S_ISREG(about.st_mode):
+            return None  # a pipe or a device may never end
         if about.st_size > MOST_COMPARED_BYTES:
             return [about.st_size, about.st_mtime_ns]
         return hashlib.sha256(path.read_bytes()).hexdigest()

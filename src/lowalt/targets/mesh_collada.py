@@ -15,29 +15,49 @@ from xml.parsers import expat
 
 import numpy as np
 
+from lowalt.files.atomic import bytes_of
 from lowalt.files.errors import InputError
-from lowalt.targets.mesh_polygons import triangulated
+from lowalt.targets.mesh_polygons import LARGEST_TRIANGLES, refuse_many, triangulated
 
 UNUSED = ("library_images", "library_effects", "library_materials", "bind_material")
 
 
+MOST_XML_BYTES = 256 << 20
+MOST_ELEMENTS = 2_000_000
+"""Largest number of elements and attributes of an XML file; each takes some hundred bytes."""
+INSTANCE_COST = 100
+"""An instance of a geometry counts as at least this many triangles."""
+
+
 class _Plain(ElementTree.TreeBuilder):
-    """A tree of XML without a document type, which could name entities."""
+    """A tree of XML without a document type, which could name entities, and of bounded size."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.count = 0
+
+    def start(self, tag: str, attributes: dict[str, str]) -> ElementTree.Element:
+        """Begin an element. Raises: ValueError for more than MOST_ELEMENTS."""
+        self.count += 1 + len(attributes)
+        if self.count > MOST_ELEMENTS:
+            raise ValueError(f"more than {MOST_ELEMENTS} elements and attributes")
+        return super().start(tag, attributes)
 
     def doctype(self, *_: object) -> None:
         """Refuse a document type."""
         raise ValueError("it declares a document type, expected none")
 
 
-def parsed(path: Path) -> ElementTree.Element:
+def parsed(path: Path, most_bytes: int = MOST_XML_BYTES) -> ElementTree.Element:
     """Return the root of an XML file; nothing that it names is opened.
 
     Entities of its own are refused. A prefix that it does not declare, such as `gz:`, is part of
     the name, as Gazebo's own parser has it.
 
-    Raises: InputError naming the file where it is no XML or declares a document type.
+    Raises: InputError naming the file where it is no XML, declares a document type, or has more
+    than `most_bytes` bytes or MOST_ELEMENTS elements.
     """
-    data = path.read_bytes()
+    data = bytes_of(path, "XML file", most_bytes)
     try:
         try:
             return ElementTree.fromstring(data, ElementTree.XMLParser(target=_Plain()))
@@ -121,6 +141,7 @@ def for_trimesh(path: Path) -> tuple[bytes, dict[str, list[str]]]:
             for element in parent:
                 if _name(element) in ("polylist", "polygons"):
                     _cut(element, elements)
+    _refuse_many_instances(root, elements)
     return ElementTree.tostring(root), _geometry_names(root, elements)
 
 
@@ -146,6 +167,44 @@ def _geometry_names(root: ElementTree.Element, elements: dict) -> dict[str, list
 
     add_below(root, [])
     return names
+
+
+def _refuse_many_instances(root: ElementTree.Element, elements: dict) -> None:
+    """Refuse a file whose nodes show too many triangles; a node that shows others twice, level upon
+    level, makes billions of a few lines.
+
+    elements: by their ids. Raises: InputError.
+    """
+    shown: dict[int, int] = {}
+
+    def triangles(element: ElementTree.Element) -> int:
+        """About how many triangles an element shows, a lone geometry its own."""
+        if id(element) not in shown:
+            shown[id(element)] = LARGEST_TRIANGLES + 1  # until it is counted: it may show itself
+            shown[id(element)] = counted(element)
+        return shown[id(element)]
+
+    def counted(element: ElementTree.Element) -> int:
+        """The sum over what stands in an element, and over what it names."""
+        kind = _name(element)
+        if kind in ("instance_geometry", "instance_node"):
+            named = elements.get(element.get("url", "")[1:])
+            return INSTANCE_COST + (0 if named is None else triangles(named))
+        if kind == "geometry":
+            return sum(_numbers_of(each) // 3 for each in element.iter() if _name(each) == "p")
+        inner = ("node", "visual_scene", "instance_geometry", "instance_node")
+        return sum(triangles(child) for child in element if _name(child) in inner)
+
+    own = sum(triangles(element) for element in root.iter() if _name(element) == "geometry")
+    for scene in root.iter():
+        if _name(scene) == "visual_scene":
+            refuse_many(triangles(scene), own)
+
+
+def _numbers_of(element: ElementTree.Element) -> int:
+    """About how many numbers the text of an element has."""
+    text = element.text or ""
+    return text.count(" ") + text.count("\n") + text.count("\t") + 1
 
 
 def _cut(element: ElementTree.Element, elements: dict) -> None:

@@ -22,13 +22,20 @@ from lowalt.files.atomic import existing
 from lowalt.files.errors import InputError, reading, warn
 from lowalt.numerics import portable
 from lowalt.targets.mesh_collada import for_trimesh, stated_metres, stated_up
-from lowalt.targets.mesh_polygons import Piece, read_obj, stated_unit
+from lowalt.targets.mesh_polygons import (
+    LARGEST_TRIANGLES,
+    MOST_MESH_BYTES,
+    Piece,
+    read_obj,
+    refuse_many,
+    stated_unit,
+)
 from lowalt.targets.surfaces import Surface, merged
 
 OWN_SUFFIXES = (".stl", ".obj", ".dae")
 UNITS_M = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
-LARGEST_TRIANGLES = 20_000_000
-"""A file with more triangles is refused, since its arrays alone would take over two gigabytes."""
+TEXT_BYTES = 100
+"""Least number of bytes of a triangle in a text STL file."""
 
 SAME_UNIT = 1e-6
 """Two units are the same if their relative difference is at most this."""
@@ -146,8 +153,9 @@ def _scene(path: Path) -> list[Piece]:
     return result
 
 
-def _refuse_truncated(path: Path) -> None:
-    """Refuse a binary STL file that ends before the number of triangles that its header states.
+def _refuse_stl(path: Path) -> None:
+    """Refuse a binary STL file that ends before the number of triangles that its header states, and
+    a file of too many triangles, of which a text has at least TEXT_BYTES each.
 
     Raises: InputError naming the file and both numbers.
     """
@@ -162,6 +170,10 @@ def _refuse_truncated(path: Path) -> None:
             f"{path}: the header states {stated} triangles and the file ends after {there}, "
             "expected the whole file: copy or export it again"
         )
+    if is_text:
+        there = path.stat().st_size // TEXT_BYTES
+    if there > LARGEST_TRIANGLES:
+        raise InputError(f"{path}: {there} triangles, expected at most {LARGEST_TRIANGLES}")
 
 
 def pieces(path: Path) -> list[Piece]:
@@ -170,7 +182,7 @@ def pieces(path: Path) -> list[Piece]:
     Raises: InputError naming the file and the reason: no such file, another format, or it cannot be
     read.
     """
-    path = existing(path, "mesh")
+    path = existing(path, "mesh", MOST_MESH_BYTES)
     kind = path.suffix.lower()
     added = _added(kind)
     if added is None and kind not in OWN_SUFFIXES:
@@ -180,8 +192,11 @@ def pieces(path: Path) -> list[Piece]:
         read = added.pieces
     with reading(path, f"{path.suffix} mesh"):
         if path.suffix.lower() == ".stl":
-            _refuse_truncated(path)
-        return [piece for piece in read(path) if len(piece.faces)]
+            _refuse_stl(path)
+        found = [piece for piece in read(path) if len(piece.faces)]
+        triangles = sum(len(piece.faces) for piece in found)
+        refuse_many(triangles, triangles)
+        return found
 
 
 def selected(path: Path, names: list[str] | None) -> list[Piece]:
@@ -302,8 +317,6 @@ def read_mesh(path: str | Path, unit: str | float, geometry: list[str] | None = 
             f"{path}: the file states a unit of {stated:g} m, the record says {unit}; the record "
             "is followed"
         )
-    if len(faces) > LARGEST_TRIANGLES:
-        raise InputError(f"{path}: {len(faces)} triangles, expected at most {LARGEST_TRIANGLES}")
     # One mark per vertex: a copy of millions of corners would double the memory.
     finite = np.isfinite(vertices).all(axis=1)
     if faces.min() < 0 or faces.max() >= len(vertices) or not finite[faces].all():

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.files.atomic import existing
+from lowalt.files.atomic import existing, text_file
 from lowalt.files.errors import InputError
 from lowalt.numerics import portable
 from lowalt.targets.skeleton import LIMBS, NODES
@@ -38,9 +38,10 @@ class Skeleton:
 
 def _lines(path: Path) -> Iterator[list[str]]:
     """The words of each line of a file, without comments; lines without a word are left out."""
-    for line in path.read_text(encoding="utf-8-sig", errors="replace").splitlines():
-        if words := line.split("#", 1)[0].split():
-            yield words
+    with text_file(path, "motion file", errors="replace") as file:
+        for line in file:
+            if words := line.split("#", 1)[0].split():
+                yield words
 
 
 def _sections(path: Path) -> dict[str, list[list[str]]]:

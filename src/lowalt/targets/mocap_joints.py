@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from lowalt.files.array_files import UNREADABLE, checked_archive
-from lowalt.files.atomic import existing
+from lowalt.files.atomic import text_of
 from lowalt.files.errors import InputError, reading
 from lowalt.numerics import portable
 from lowalt.targets.mocap_motion import Motion
@@ -63,6 +63,10 @@ BEYOND = {"wrist": 0.1, "hand": 0.35, "fingers": 0.6, "thumb": 0.35}
 RATES = ("mocap_framerate", "mocap_frame_rate", "fps")
 """Names of a frame rate (Hz) in an .npz file, the surest first."""
 MOST_NUMBERS = 100_000_000
+FREE_NUMBERS = 3_000_000
+MOST_EXPANSION = 100
+"""Numbers of positions and turns that a file may make: this many, or so many times its own."""
+MOST_BVH_BYTES = 256 << 20
 
 
 class _Joint(NamedTuple):
@@ -194,8 +198,7 @@ def read_bvh(path: str | Path) -> tuple[dict[str, np.ndarray], float]:
     The end of a chain is named `NAME/end` after the chain's last joint.
     Raises: InputError naming the file and the joint or frame that is wrong.
     """
-    path = existing(path, "motion file")
-    head, _, data = path.read_text(encoding="utf-8-sig", errors="replace").partition("MOTION")
+    head, _, data = text_of(path, "motion file", MOST_BVH_BYTES, "replace").partition("MOTION")
     stack: list[str] = []
     joints: list[_Joint] = []
     words = iter(re.sub(r"#.*", "", head).split())
@@ -234,8 +237,10 @@ def _followed(joints: list[_Joint], values: np.ndarray) -> dict[str, np.ndarray]
     """Return the positions (F, 3) of joints, parents first, from their channels (F, C)."""
     twice = len({joint.name for joint in joints}) < len(joints)
     numbers = len(joints) * len(values) * 9  # a rotation (3, 3) of each joint in each frame
-    if twice or numbers > MOST_NUMBERS:
-        raise ValueError("a joint that stands twice, or too many frames")
+    # Ends of chains have no numbers of their own in the file.
+    most = min(MOST_NUMBERS, max(FREE_NUMBERS, MOST_EXPANSION * values.size))
+    if twice or numbers > most:
+        raise ValueError("a joint that stands twice, or too many joints and frames")
     positions: dict[str, np.ndarray] = {}
     turns: dict[str, np.ndarray] = {}
     column = 0

@@ -20,12 +20,14 @@ from typing import Any
 from lowalt.config.command import refusing
 from lowalt.files.atomic import FULL
 from lowalt.files.errors import InputError
+from lowalt.machine.run_pipe import end_with_starter, hold_pipe
 from lowalt.workflow.locks import TOKEN, Owner, drop, guarded, holders, refusal, take, take_over
 
 
 def install() -> None:
     """Apply all workarounds to this process."""
     end_locks()
+    end_jobs()
     answer_ctrl_c()
     keep_one_timer()
     ask_slurm_sooner()
@@ -101,6 +103,21 @@ def _cleanup_locks(self: Any) -> None:
         if alive:
             raise InputError("not unlocked: " + "; ".join(alive))
         self.unlock()
+
+
+# Fault: jobs go on for minutes after SIGKILL of the run. No issue upstream.
+# Cause: nothing tells a job that Snakemake has ended. Held in: Snakemake 9.27.
+# Cure: jobs inherit a pipe that the system closes with the run; the run itself ends in this way with
+# the command `lowalt run`.
+
+
+def end_jobs() -> None:
+    """Let the jobs of this process end with it, and this process with `lowalt run`."""
+    from snakemake.shell import shell
+
+    if "pass_fds" not in shell._process_args:
+        end_with_starter()
+        shell._process_args["pass_fds"] = (hold_pipe(),)
 
 
 # Fault: a second Ctrl-C interrupts the clean-up of jobs and files, with tracebacks. No issue

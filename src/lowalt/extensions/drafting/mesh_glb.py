@@ -13,10 +13,11 @@ from pathlib import Path
 import numpy as np
 
 from lowalt.extensions.drafting.mesh_ply import stripped
+from lowalt.files.atomic import bytes_of
 from lowalt.files.errors import InputError
 from lowalt.files.json_objects import json_object
 from lowalt.numerics import portable
-from lowalt.targets.mesh_polygons import Piece
+from lowalt.targets.mesh_polygons import MOST_MESH_BYTES, Piece, refuse_many
 
 TYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
@@ -29,7 +30,10 @@ COMPRESSED = {
     "EXT_meshopt_compression": "meshopt",
     "KHR_meshopt_compression": "meshopt",
 }
-MOST_VALUES = 200_000_000
+OF_TRIANGLE = 6
+"""Numbers of a triangle: three corners, and half a vertex of three numbers."""
+OF_POSE = 200
+"""Numbers that take as long as the pose of a node or of an instance."""
 METRES = 1.0
 """Metres of the unit of the format. Source: glTF 2.0, section 3.4."""
 UP = "y"
@@ -48,21 +52,39 @@ class _Glb:
             raise ValueError("expected a binary glTF of version 2")
         self.json = json_object(data[20 : 20 + size].decode(), "its JSON", "glTF")
         self.binary = data[28 + size :]
+        self.embedded: dict[int, bytes] = {}
+        self.size = len(data)
+        self.values = 0
+        self.count(OF_POSE * len(self.listed("nodes")))
+
+    def count(self, values: int) -> None:
+        """Count numbers before they are made, however often one surface is shown.
+
+        Raises: InputError for too many.
+        """
+        self.values += values
+        refuse_many(self.values // OF_TRIANGLE, self.size // OF_TRIANGLE)
 
     def listed(self, name: str) -> list:
         """A list of the file's JSON, empty where it has none."""
         return self.json.get(name, [])
 
-    def _view(self, index: int, kind: str, width: int, count: int, offset: int) -> np.ndarray:
-        """`count` elements of `width` numbers of a buffer view, as they are stored."""
-        view = self.listed("bufferViews")[_natural(index)]
-        data = self.binary
-        uri = self.listed("buffers")[_natural(view["buffer"])].get("uri")
-        if uri:
+    def _buffer(self, index: int) -> bytes:
+        """The bytes of a buffer: those behind the JSON, or those in it."""
+        uri = self.listed("buffers")[index].get("uri")
+        if not uri:
+            return self.binary
+        if index not in self.embedded:
             head, _, text = uri.partition(";base64,")
             if not head.startswith("data:"):
                 raise ValueError("its data lies in another file, expected all in one")
-            data = base64.b64decode(text)
+            self.embedded[index] = base64.b64decode(text)
+        return self.embedded[index]
+
+    def _view(self, index: int, kind: str, width: int, count: int, offset: int) -> np.ndarray:
+        """`count` elements of `width` numbers of a buffer view, as they are stored."""
+        view = self.listed("bufferViews")[_natural(index)]
+        data = self._buffer(_natural(view["buffer"]))
         start = _natural(view.get("byteOffset", 0))
         length = _natural(view["byteLength"])
         data = data[start : start + length]
@@ -77,8 +99,7 @@ class _Glb:
         kind = TYPES[accessor["componentType"]]
         width = WIDTHS[accessor["type"]]
         count = _natural(accessor["count"])
-        if count * width > MOST_VALUES:
-            raise ValueError(f"an array of {count * width} numbers, expected at most {MOST_VALUES}")
+        self.count(count * width)
         if "bufferView" in accessor:
             offset = _natural(accessor.get("byteOffset", 0))
             values = self._view(accessor["bufferView"], kind, width, count, offset).copy()
@@ -95,6 +116,7 @@ class _Glb:
         at = sparse["indices"]
         new = sparse["values"]
         count = sparse["count"]
+        self.count(_natural(count) * values.shape[1])
         index_kind = TYPES[at["componentType"]]
         rows = self._view(at["bufferView"], index_kind, 1, count, at.get("byteOffset", 0))
         width = values.shape[1]
@@ -146,6 +168,7 @@ class _Glb:
         The pose of the node itself does not count.
         """
         joints = skin["joints"]
+        self.count(16 * len(joints))
         attributes = primitive["attributes"]
         bind = np.tile(np.eye(4), (len(joints), 1, 1))
         if "inverseBindMatrices" in skin:
@@ -226,6 +249,7 @@ def _instances(glb: _Glb, node: dict) -> list[np.ndarray]:
     }
     if not columns:
         return [np.eye(4)]
+    glb.count(OF_POSE * max(map(len, columns.values())))
     rows = zip(*columns.values(), strict=True)
     return [_local(dict(zip(columns, row, strict=True))) for row in rows]
 
@@ -236,7 +260,7 @@ def pieces(path: Path) -> list[Piece]:
     Raises: InputError where the file is compressed, or its data lies elsewhere; other exceptions
     for a damaged file.
     """
-    glb = _Glb(path.read_bytes())
+    glb = _Glb(bytes_of(path, "mesh", MOST_MESH_BYTES))
     for name, word in COMPRESSED.items():
         if name in glb.listed("extensionsRequired"):
             raise InputError(
@@ -268,16 +292,14 @@ def pieces(path: Path) -> list[Piece]:
                 skin = glb.listed("skins")[_natural(node["skin"])]
                 pieces.append(replace(piece, vertices=glb.skinned(points, primitive, skin, poses)))
                 continue
-            pieces += _placed(piece, name, pose, _instances(glb, node))
+            instances = _instances(glb, node)
+            glb.count((len(instances) - 1) * (piece.faces.size + piece.vertices.size))
+            pieces += _placed(piece, name, pose, instances)
     return pieces
 
 
 def _placed(piece: Piece, name: str, pose: np.ndarray, instances: list[np.ndarray]) -> list[Piece]:
     """A piece at each instance (4, 4) of a node at a pose (4, 4); name: the node's."""
-    if len(instances) * max(piece.faces.size, piece.vertices.size) > MOST_VALUES:
-        raise ValueError(
-            f"{len(instances)} instances of {len(piece.faces)} triangles, expected fewer"
-        )
     result = []
     for number, instance in enumerate(instances):
         at = portable.product(pose, instance)

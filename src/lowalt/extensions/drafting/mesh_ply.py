@@ -4,12 +4,14 @@ trimesh drops strips, and takes all faces of a binary file to be as long as its 
 writes mixed ones). Source: Greg Turk, The PLY Polygon File Format (1994).
 """
 
+import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
-from lowalt.targets.mesh_polygons import Piece, triangulated
+from lowalt.files.atomic import bytes_of
+from lowalt.targets.mesh_polygons import MOST_MESH_BYTES, Piece, triangulated
 
 
 def stripped(strip: np.ndarray) -> np.ndarray:
@@ -71,7 +73,9 @@ class _Ply:
                 self.elements[-1][2].append(words[1:])
         self.order = ORDERS[kind]
         if not self.order:  # the numbers of a text, as if they were stored one by one
-            self.data = np.array(data[self.at :].split(), float).tobytes()
+            with warnings.catch_warnings():
+                warnings.simplefilter("error")  # NumPy only warns of a word that is no number
+                self.data = np.fromstring(data[self.at :], float, sep=" ").tobytes()
             self.at = 0
 
     def dtype(self, word: str) -> np.dtype:
@@ -136,7 +140,7 @@ def pieces(path: Path) -> list[Piece]:
 
     Raises: exceptions of many types for a damaged file.
     """
-    ply = _Ply(path.read_bytes())
+    ply = _Ply(bytes_of(path, "mesh", MOST_MESH_BYTES))
     vertices = np.zeros((0, 3))
     polygons: Sequence[np.ndarray] | np.ndarray = []
     faces = []

@@ -24,7 +24,6 @@ from lowalt.extensions.drafting.robot_geometry import (
     numbers,
     pose_of,
     primitive,
-    shown,
 )
 from lowalt.extensions.drafting.robot_mjcf import mjcf
 from lowalt.files.errors import InputError, reading
@@ -301,7 +300,7 @@ class _Links:
             for view in link.findall(surface):
                 triangles = _geometry(view.find("geometry"), base, self.files)
                 pose = portable.product(self.pose(name), _pose(view))
-                self.robot.surfaces[name].append(shown(triangles, pose))
+                self.robot.surfaces[name].append(self.files.shown(triangles, pose))
         for joint in self.joints:
             parent, child = (self._link(joint.scope, end) for end in joint.ends)
             kind = joint.element.get("type")

@@ -16,8 +16,10 @@ from lowalt.files.errors import InputError, warn
 from lowalt.numerics import portable
 from lowalt.targets.mesh_collada import parsed, stated_metres
 from lowalt.targets.mesh_files import selected, suffixes
+from lowalt.targets.mesh_polygons import Piece, refuse_many
 
 LARGEST_BYTES = 16 << 20
+"""Largest size of a description with all that it includes."""
 MOST_FILES = 200
 MOST_SEARCHED = 100_000
 """Most files and folders below the folder of inputs that are searched for a package of another
@@ -116,6 +118,10 @@ class Files:
     def __init__(self, inputs: Path) -> None:
         self.inputs = inputs.resolve()
         self.opened = 0
+        self.bytes_left = LARGEST_BYTES
+        self.triangles = 0
+        # Pieces of meshes by file and part: a description may name one mesh many times.
+        self.read: dict[tuple[Path, str | None], list[Piece]] = {}
         # The folders and name of every path below `inputs`, once they are needed.
         self.listed: list[tuple[str, ...]] | None = None
 
@@ -197,11 +203,10 @@ class Files:
         default.
         """
         self.opened += 1
-        if self.opened > MOST_FILES or path.stat().st_size > LARGEST_BYTES:
-            raise InputError(
-                f"{path}: expected at most {MOST_FILES} files of {LARGEST_BYTES >> 20} MiB"
-            )
-        root = parsed(path)
+        root = parsed(path, self.bytes_left)
+        self.bytes_left -= path.stat().st_size
+        if self.opened > MOST_FILES:
+            raise InputError(f"{path}: one file too many, expected at most {MOST_FILES}")
         for element in root.iter():
             if "xacro" not in element.tag:
                 element.tag = element.tag.rsplit("}", 1)[-1]
@@ -221,7 +226,11 @@ class Files:
         unit = 1.0
         if path.suffix.lower() == ".dae":
             unit = stated_metres(path) or 1.0
-        pieces = [piece.vertices[piece.faces] for piece in selected(path, [part] if part else None)]
+        if (path, part) not in self.read:
+            self.read[path, part] = selected(path, [part] if part else None)
+        found = self.read[path, part]
+        refuse_many(self.triangles + sum(len(piece.faces) for piece in found), self._own())
+        pieces = [piece.vertices[piece.faces] for piece in found]
         if not pieces:
             raise InputError(f"{name!r} has no triangle, expected a surface")
         triangles = np.concatenate(pieces) * unit * scale
@@ -229,6 +238,19 @@ class Files:
             # A mirror image turns the surface inside out.
             return triangles[:, ::-1]
         return triangles
+
+    def _own(self) -> int:
+        """The triangles of the meshes read so far, each once."""
+        return sum(len(piece.faces) for pieces in self.read.values() for piece in pieces)
+
+    def shown(self, triangles: np.ndarray, place: np.ndarray) -> np.ndarray:
+        """Return triangles (K, 3, 3) at a place; those of the whole description are counted.
+
+        Raises: InputError where they are too many.
+        """
+        self.triangles += len(triangles)
+        refuse_many(self.triangles, self._own())
+        return shown(triangles, place)
 
 
 def primitive(kind: str, size: np.ndarray) -> np.ndarray:

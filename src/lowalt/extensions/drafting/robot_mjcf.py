@@ -131,7 +131,7 @@ class _Mjcf:
             else:
                 whole = size * [1, 2]
             triangles = primitive(kind, whole)
-        return shown(triangles, portable.product(above, pose))
+        return self.files.shown(triangles, portable.product(above, pose))
 
     def body(
         self, element: Element, parent: str, above: np.ndarray, childclass: str, depth: int

@@ -9,14 +9,19 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lowalt.extensions.town.building_surfaces import Surfaces, joined, mesh_parts, such_as
+from lowalt.extensions.town.building_surfaces import (
+    Surfaces,
+    joined,
+    mesh_parts,
+    refuse_many,
+    such_as,
+)
 from lowalt.extensions.town.facets import Town, corner_numbers, sizes, town
 from lowalt.extensions.town.materials import MATERIALS
 from lowalt.files.atomic import existing
 from lowalt.files.errors import InputError, reading
 from lowalt.targets.mesh_files import suffixes
 
-MOST_TRIANGLES = 500_000
 FLOOR_M = 0.05
 """Triangles whose corners are all lower than this are the ground, which is a plane of its own."""
 LOWEST_M = -1.0
@@ -86,8 +91,7 @@ def _cleaned(path: Path, found: Surfaces) -> tuple[np.ndarray, np.ndarray, dict[
     dropped = dict(found.left_out)
     if not len(corners):
         raise InputError(f"{path}: has no surface of a building, expected some")
-    if len(corners) > MOST_TRIANGLES:
-        raise InputError(f"{path}: {len(corners)} triangles, expected at most {MOST_TRIANGLES}")
+    refuse_many(path, len(corners))
     if not np.isfinite(corners).all() or abs(corners).max() > 1e9:
         raise InputError(f"{path}: a corner is NaN, infinite or beyond 1e9 m, expected finite ones")
     low = corners.min(axis=(0, 1))

@@ -11,6 +11,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import ConvexHull
 
+from lowalt.files.errors import InputError
 from lowalt.numerics import portable
 from lowalt.scene import rays
 
@@ -19,6 +20,11 @@ GRID_M = 1e-3
 
 Files in single precision repeat corners with other digits.
 """
+FEW = 64
+"""Number of a building's corners that are compared with all its facets first."""
+BLOCK = 1 << 20
+MOST_COMPARED = 1_000_000_000
+"""Numbers of pairs of a facet and a corner that are compared at once, and in all of a town."""
 FLAT_M = 0.02
 PARALLEL = 1e-3
 """Corners of a facet are at most FLAT_M off its plane.
@@ -173,16 +179,38 @@ def _outward(
     lone = (np.bincount(which)[which] != 2) & (height[edges].max(axis=1) > FLAT_M)
     result = np.zeros(len(planes))
     order = np.argsort(building, kind="stable")
+    compared = 0
     starts = np.searchsorted(building[order], np.arange(int(building.max()) + 2))
     for number in np.setdiff1d(building, building[triangle_of[lone]]):
         triangles = order[starts[number] : starts[number + 1]]
         facets = np.unique(label[triangles])
-        points = corners[triangles].reshape(-1, 3)
-        over = portable.product(planes[facets, :3], points.T) - planes[facets, 3:]
-        all_below = over.max(axis=1) <= FLAT_M
-        all_above = over.min(axis=1) >= -FLAT_M
-        result[facets] = all_below.astype(float) - all_above
+        points = np.unique(corners[triangles].reshape(-1, 3), axis=0)
+        # Most facets of a building with dents have corners on both sides among a few of them.
+        some = points[:: -(-len(points) // FEW)]
+        below, above = _one_sided(planes[facets], some)
+        facets = facets[below | above]
+        compared += len(facets) * len(points)
+        if compared > MOST_COMPARED:
+            raise InputError(
+                f"a building of {len(facets)} facets and {len(points)} corners, expected fewer: "
+                "divide its round walls less finely"
+            )
+        below, above = _one_sided(planes[facets], points)
+        result[facets] = below.astype(float) - above
     return result
+
+
+def _one_sided(planes: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Whether points (P, 3) m lie all below and all above planes (K, 4), two of (K,) bool."""
+    below = np.ones(len(planes), bool)
+    above = np.ones(len(planes), bool)
+    rows = max(1, BLOCK // max(1, len(points)))
+    for first in range(0, len(planes), rows):
+        block = slice(first, first + rows)
+        over = portable.product(planes[block, :3], points.T) - planes[block, 3:]
+        below[block] = over.max(axis=1) <= FLAT_M
+        above[block] = over.min(axis=1) >= -FLAT_M
+    return below, above
 
 
 def town(

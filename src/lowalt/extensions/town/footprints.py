@@ -13,7 +13,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lowalt.extensions.town.building_surfaces import Surfaces, joined, such_as
+from lowalt.extensions.town.building_surfaces import (
+    MOST_TRIANGLES,
+    Surfaces,
+    joined,
+    such_as,
+)
 from lowalt.extensions.town.building_tags import height_of, is_building, is_part, low_of
 from lowalt.extensions.town.materials import named
 from lowalt.files.atomic import text_of
@@ -28,7 +33,12 @@ try:
 except ImportError as error:
     raise lacking(error) from None
 
-LARGEST_BYTES = 200 << 20
+LARGEST_BYTES = 64 << 20
+MOST_PLACES = MOST_TRIANGLES // 3
+MOST_CORNERS = 10_000
+"""Largest number of corners of all outlines, each of which makes two triangles of a wall and one of
+a roof, and of one feature, whose triangulation takes a time beyond proportion.
+"""
 JOINT_M = 1e-3
 """Parts of a footprint that are no farther apart adjoin."""
 NO_BUILDING = "features that are no buildings"
@@ -72,9 +82,8 @@ def _prism(polygon: Polygon, height_m: float, low_m: float) -> np.ndarray:
 
 def _features(path: Path) -> list:
     """The features of a file. Raises: InputError where it has none."""
-    if path.stat().st_size > LARGEST_BYTES:
-        raise InputError(f"{path}: over {LARGEST_BYTES >> 20} MiB, expected a town")
-    features = json_object(text_of(path, "file of buildings"), str(path), "GeoJSON").get("features")
+    text = text_of(path, "file of buildings", LARGEST_BYTES)
+    features = json_object(text, str(path), "GeoJSON").get("features")
     if not isinstance(features, list):
         raise InputError(f"{path}: has no list `features`, expected a GeoJSON FeatureCollection")
     return features
@@ -90,6 +99,20 @@ def _object_of(feature: dict, key: str, place: str) -> dict:
     return value
 
 
+def _places(coordinates: object) -> int:
+    """The number of lists of numbers in nested lists, which are places."""
+    count = 0
+    waiting = [coordinates]
+    while waiting:
+        value = waiting.pop()
+        if isinstance(value, list) and value:
+            if isinstance(value[0], list):
+                waiting += value
+            else:
+                count += 1
+    return count
+
+
 def _footprints(path: Path, all_polygons: bool) -> tuple[list[Footprint], Counter, Counter]:
     """The buildings of a file in degrees, what was left out, and what was not read as stated.
 
@@ -99,6 +122,7 @@ def _footprints(path: Path, all_polygons: bool) -> tuple[list[Footprint], Counte
     others: list[Footprint] = []
     left_out: Counter[str] = Counter()
     notes: Counter[str] = Counter()
+    places = 0
     for number, feature in enumerate(_features(path)):
         place = f"features[{number}]"
         if not isinstance(feature, dict):
@@ -113,6 +137,13 @@ def _footprints(path: Path, all_polygons: bool) -> tuple[list[Footprint], Counte
         if not called and not all_polygons:
             left_out[NO_BUILDING] += 1
             continue
+        own_places = _places(geometry.get("coordinates"))
+        places += own_places
+        if own_places > MOST_CORNERS or places > MOST_PLACES:
+            raise InputError(
+                f"{path}: {place}: {own_places} corners, {places} with those before it, expected "
+                f"at most {MOST_CORNERS} of a building and {MOST_PLACES} of a town"
+            )
         try:
             outline = shapely.force_2d(shape(geometry))
         except Exception as error:
