@@ -22,7 +22,8 @@ class Evaluated:
         hardware.
         Raises: InputError where either is missing or the test part is empty.
         """
-        self.about = about = predictions.record(path)
+        about = predictions.record(path)
+        self.about = about
         try:
             self.protocol = about["protocol"]
             self.scheme = about["scheme"]
@@ -54,9 +55,9 @@ def difference(
 ) -> Interval:
     """Return the mean over seeds of first - second, in shares of correct samples.
 
-    Its interval is that of 95 %. first, second: trainings of the two schemes, one per seed; snr_db:
-    the SNR whose samples count, None for all. The interval resamples seeds, subtypes (unseen
-    protocol) and motion models. The difference of a scheme to itself is 0.
+    It comes with its 95 % interval. first, second: trainings of the two schemes, one per seed;
+    snr_db: the SNR whose samples count, None for all. The interval resamples seeds, subtypes
+    (unseen protocol) and motion models. The difference of a scheme to itself is 0.
     Raises: InputError where the trainings were tested on different samples. Source:
     `intervals.strict_difference`.
     """
@@ -66,7 +67,9 @@ def difference(
             raise InputError(f"{first[0].scheme} and {run.scheme} were tested on different samples")
     if first is second:
         return Interval(0.0, 0.0, 0.0)
-    rows = slice(None) if snr_db is None else test.snr_db == snr_db
+    rows: slice | np.ndarray = slice(None)
+    if snr_db is not None:
+        rows = test.snr_db == snr_db
     motion = test.motion[rows]
     sample, count, ours = model_shares(motion, [run.test.correct[rows] for run in first])
     _, _, theirs = model_shares(motion, [run.test.correct[rows] for run in second])
@@ -75,18 +78,21 @@ def difference(
 
 
 def whole_subtypes(runs: list[Evaluated]) -> bool:
-    """Return whether intervals resample whole subtypes, as where results speak of other ones."""
+    """Return whether intervals resample whole subtypes: in the unseen protocol.
+
+    Its results speak of subtypes that are not in the data set.
+    """
     return runs[0].protocol == "unseen"
 
 
 def spread_points(*groups: list[float]) -> float | None:
-    """Return the standard deviation between seeds, pooled over groups; None for one seed.
+    """Return the standard deviation between seeds, pooled over groups.
 
-    groups: accuracies in percent, one a seed.
+    groups: accuracies in percent, one for each seed. Return None if no group has several seeds.
     """
     several = [np.array(group) for group in groups if len(group) > 1]
-    freedom = sum(len(group) - 1 for group in several)
-    if not freedom:
+    degrees_of_freedom = sum(len(group) - 1 for group in several)
+    if degrees_of_freedom == 0:
         return None
     squares = sum(((group - group.mean()) ** 2).sum() for group in several)
-    return float(np.sqrt(squares / freedom))
+    return float(np.sqrt(squares / degrees_of_freedom))

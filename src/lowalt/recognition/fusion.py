@@ -16,6 +16,9 @@ from torch import nn
 
 from lowalt.files.errors import InputError
 
+EMBEDDING_STD = 0.02
+"""Standard deviation of the first values of embeddings, as in vision transformers."""
+
 
 def encoder(width: int, depth: int, heads: int, feed_forward: float, dropout: float) -> nn.Module:
     """Return a transformer encoder of `depth` layers over tokens of `width` features.
@@ -57,7 +60,9 @@ class Fusion(nn.Module):
         self, tokens: torch.Tensor, classifier: nn.Module
     ) -> tuple[torch.Tensor, torch.Tensor]:
         """Tokens (B, K, V, features) -> logits (B, classes), and (B * K, classes) per station."""
-        return self.decided(tokens, classifier), self.decided(self.each_station(tokens), classifier)
+        of_all = self.decided(tokens, classifier)
+        of_each = self.decided(self.each_station(tokens), classifier)
+        return of_all, of_each
 
 
 class AttentionFusion(Fusion):
@@ -74,7 +79,7 @@ class AttentionFusion(Fusion):
                 f"network: heads is {block['heads']}, expected a divisor of the {width} features"
             )
         self.modality = nn.Parameter(torch.empty(views, width))
-        nn.init.trunc_normal_(self.modality, std=0.02)
+        nn.init.trunc_normal_(self.modality, std=EMBEDDING_STD)
         self.draws = block["dropout"] > 0
         shape = (block["heads"], block["feed_forward"], block["dropout"])
         self.intra = encoder(width, block["intra_depth"], *shape)
@@ -103,9 +108,9 @@ class AttentionFusion(Fusion):
             return super().both(tokens, classifier)
         station = self.stations(tokens)
         alone = station.flatten(0, 1).unsqueeze(1)
-        return classifier(self.inter(station).amax(dim=1)), classifier(
-            self.inter(alone).amax(dim=1)
-        )
+        of_all = classifier(self.inter(station).amax(dim=1))
+        of_each = classifier(self.inter(alone).amax(dim=1))
+        return of_all, of_each
 
 
 class MeanFusion(Fusion):
@@ -136,8 +141,8 @@ class Fused(nn.Module):
     ) -> None:
         """Add fusion and classifier behind the tokens.
 
-        name: of FUSIONS; width: features of a token; shape: stations, views of a station; block:
-        `recognition.network`.
+        name: a key of FUSIONS; width: features of a token; shape: stations, views of a station;
+        block: `recognition.network`.
         Raises: InputError for heads that do not divide the features.
         """
         self.shape = shape

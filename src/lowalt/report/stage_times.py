@@ -53,19 +53,14 @@ def stage_times(paths: Iterable[str | Path]) -> list[dict]:
 
 def write_stages(path: str | Path, run: ReportedRun) -> None:
     """Write the times of the rules as CSV, with samples, bytes per sample and the hardware."""
-    about = len(run.shards), f"{run.sample_bytes:.0f}", describe()
-    write_csv(
-        path,
-        COLUMNS,
-        [
-            [
-                entry["rule"],
-                entry["jobs"],
-                f"{entry['wall_s']:.2f}",
-                f"{entry['cpu_s']:.2f}",
-                f"{entry['peak_mib']:.0f}",
-                *about,
-            ]
-            for entry in stage_times(run.inputs.paths("benchmarks"))
-        ],
-    )
+    samples = len(run.shards)
+    sample_bytes = f"{run.sample_bytes:.0f}"
+    hardware = describe()
+    rows = []
+    for entry in stage_times(run.inputs.paths("benchmarks")):
+        wall_s = f"{entry['wall_s']:.2f}"
+        cpu_s = f"{entry['cpu_s']:.2f}"
+        peak_mib = f"{entry['peak_mib']:.0f}"
+        figures = (wall_s, cpu_s, peak_mib, samples, sample_bytes, hardware)
+        rows.append([entry["rule"], entry["jobs"], *figures])
+    write_csv(path, COLUMNS, rows)

@@ -66,19 +66,19 @@ def write_chunk(dataset: Dataset, folder: Path, chunk: str, kind: str) -> list[P
     rows = rows_of(dataset, chunk)
     cells = cell_type(dataset.config)
     levels = plan.chunk(chunk).snrs
-    group, _, part = chunk.partition("-")
+    group, _, chunk_number = chunk.partition("-")
     if chunk in plan.sources:
         write_table(folder / "motion" / f"{chunk}.csv", rows)
-    # The samples of a shard are shuffled, so keep the echoes of all its motion models until it is
-    # written.
+    # The samples of a shard are in a drawn order, so the echoes of all its motion models are kept
+    # until it is written.
     maker.kept = len(rows)
 
-    def content(number: int, level: int) -> tuple[bytes, dict]:
+    def content(index: int, level: int) -> tuple[bytes, dict]:
         """Data of one sample, and what its record says of cubes.
 
-        number: of its row of the chunk; level: index of its SNR.
+        index: its row of the chunk; level: index of its SNR.
         """
-        row = rows[number]
+        row = rows[index]
         if kind == "recipe":
             echoes, _ = maker.received(row)
             return npy(echoes), {}
@@ -106,8 +106,9 @@ def write_chunk(dataset: Dataset, folder: Path, chunk: str, kind: str) -> list[P
     for name in plan.folds(chunk):
         pieces = plan.pieces(chunk, name)
         for number, piece in enumerate(pieces):
-            paths.append(folder / "shards" / f"{group}-{name}-{part}{piece}.tar")
-            write_shard(paths[-1], samples, name, kind, content, (number, len(pieces)))
+            path = folder / "shards" / f"{group}-{name}-{chunk_number}{piece}.tar"
+            write_shard(path, samples, name, kind, content, (number, len(pieces)))
+            paths.append(path)
     return paths
 
 

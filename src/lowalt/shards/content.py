@@ -42,23 +42,23 @@ def noisy_content(
     """
     signals = _signals(kind, path, network, shape)
     if kind == "signal":
-        return lambda number, level: (npy(signals[number, level]), {})
+        return lambda model, level: (npy(signals[model, level]), {})
     if tiles is None:
         raise InputError("--tiles: missing, image shards are packed from them")
     images = Tiles(tiles)
     models, levels = shape
     if len(images) != models * levels:
         raise InputError(f"{tiles}: {len(images)} images, expected {models * levels}")
-    return lambda number, level: (images[number * levels + level], {})
+    return lambda model, level: (images[model * levels + level], {})
 
 
 def clean_content(
     paths: list[str] | None, powers: list[str] | None, network: Network, models: int
 ) -> tuple[Content, np.ndarray | None]:
-    """Return the content of recipe shards from the chunk's clean echoes, and powers or None.
+    """Return the content of recipe shards from the chunk's clean echoes, and reference powers.
 
-    The powers (stations, models) W are what SNRs refer to. Raises: InputError naming the option or
-    file that is missing or does not fit.
+    The powers (stations, models) W are what SNRs refer to, None where no files of powers are given.
+    Raises: InputError naming the option or file that is missing or does not fit.
     """
     if not paths:
         raise InputError("--echoes: missing, recipe shards are packed from them")
@@ -70,9 +70,9 @@ def clean_content(
         path = existing(paths[0], "echo")
         raise InputError(f"{path}: {first.dtype} {first.shape}, expected complex64 {wanted}")
 
-    def content(number: int, level: int) -> tuple[bytes, dict]:
-        """The clean echoes of one motion model."""
-        return npy(np.stack([echo[number] for echo in echoes])), {}
+    def content(model: int, level: int) -> tuple[bytes, dict]:
+        """The clean echoes of one motion model, which are the same at each SNR."""
+        return npy(np.stack([echo[model] for echo in echoes])), {}
 
     if not powers:
         return content, None

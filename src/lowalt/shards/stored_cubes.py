@@ -17,9 +17,11 @@ from lowalt.shards.sample_record import npy, real_and_imaginary
 from lowalt.spectra.cube import TRUTH, Cube
 from lowalt.tiles.tile_files import npy_header
 
-LARGEST = 2**15 - 1
+MAGNITUDE_BITS = 15
+"""Bits of an int16 besides its sign."""
+LARGEST = 2**MAGNITUDE_BITS - 1
 LEAST_EXPONENT = -149
-"""Of the smallest step: float32 has no smaller numbers."""
+"""Exponent of the smallest step, the smallest positive number of float32."""
 
 
 def rounded(cells: np.ndarray) -> tuple[np.ndarray, float]:
@@ -33,8 +35,11 @@ def rounded(cells: np.ndarray) -> tuple[np.ndarray, float]:
     largest = float(np.abs(pairs).max(initial=0.0))
     if not math.isfinite(largest):
         raise InputError("cells that are not finite, expected numbers")
-    exponent = math.frexp(largest)[1] - 15
-    exponent += round(math.ldexp(largest, -exponent)) > LARGEST
+    _, binary_exponent = math.frexp(largest)
+    exponent = binary_exponent - MAGNITUDE_BITS
+    # Rounding can reach 2**15, which int16 does not hold.
+    if round(math.ldexp(largest, -exponent)) > LARGEST:
+        exponent += 1
     step = math.ldexp(1.0, max(exponent, LEAST_EXPONENT))
     return np.rint(pairs / step).astype("<i2"), step
 
@@ -45,11 +50,11 @@ def restored(whole: np.ndarray, step: float) -> np.ndarray:
 
 
 def of_cubes(cubes: Sequence[Cube], network: Network, cell_type: str) -> tuple[bytes, dict]:
-    """Return the cubes of a sample as the bytes of an .npy file, and what its record tells of them.
+    """Return the cubes of a sample as the bytes of an .npy file, and what its record says of them.
 
-    The file has (stations, symbols, cells, 2) float32 or int16. The record tells of each station
-    the step of whole numbers, the chosen cells, and the truth of each symbol to six decimals, of
-    the target and of the others in the beam.
+    The file has (stations, symbols, cells, 2) float32 or int16. For each station the record has the
+    step of whole numbers, the chosen cells, and the truth of each symbol, rounded to six decimals,
+    for the target and for the others in the beam.
     cell_type: "complex64" or "int16". Raises: InputError for cells that are not finite.
     """
     facts = {}
@@ -65,9 +70,9 @@ def of_cubes(cubes: Sequence[Cube], network: Network, cell_type: str) -> tuple[b
         block |= _columns(cube.truth)
         block["others"] = [_columns(truth) for truth in cube.others]
         facts[station.name] = block
-    if cell_type == "complex64":
-        return npy(np.stack(stored)), facts
     cells = np.stack(stored)
+    if cell_type == "complex64":
+        return npy(cells), facts
     return npy_header("<i2", cells.shape) + cells.tobytes(), facts
 
 

@@ -31,7 +31,8 @@ class TrackCost(NamedTuple):
     @property
     def words(self) -> str:
         """The cost as text, with the minutes on two cores."""
-        minutes = self.core_s / 60 / 2
+        core_minutes = self.core_s / 60
+        minutes = core_minutes / 2
         return f"{self.core_s:.0f} core-s, {minutes:.1f} min on two cores, {self.megabytes:.0f} MB"
 
 
@@ -58,12 +59,15 @@ def cost_of(tracks: list[Track]) -> TrackCost | None:
     path = shipped(f"{REFERENCE}/{NAME}")
     rows = {}
     for row in read_csv(path, *COLUMNS, what="table of costs"):
-        rows[row["part"], row["files"]] = TrackCost(
-            number(row, "core_s", path), number(row, "megabytes", path)
-        )
+        core_s = number(row, "core_s", path)
+        megabytes = number(row, "megabytes", path)
+        rows[row["part"], row["files"]] = TrackCost(core_s, megabytes)
     found = []
     for part, pairs in parts_of(tracks).items():
-        for files in (SHARED, *(f"images {group}-{fold}" for group, fold in pairs)):
+        needed = [SHARED]
+        for group, fold in pairs:
+            needed.append(f"images {group}-{fold}")
+        for files in needed:
             if (part, files) not in rows:
                 return None
             found.append(rows[part, files])
@@ -84,25 +88,27 @@ def measured(part: str, folder: str | Path) -> list[tuple]:
             f"{run}/benchmarks: no times of jobs, expected those of `lowalt benchmark make`"
         )
     for path in times:
-        last = json.loads(text_of(path, "times of a job").splitlines()[-1])["cpu_time"]
-        if not isinstance(last, (int, float)):
-            # Jobs that end before the workflow's first look have no time.
-            last = 0.0
+        # A line for each time that the job ran: the last run made the files that are there.
+        last_run = json.loads(text_of(path, "times of a job").splitlines()[-1])
+        job_core_s = last_run["cpu_time"]
+        if not isinstance(job_core_s, (int, float)):
+            # Snakemake has no time of jobs that end before it first samples them.
+            job_core_s = 0.0
         files = _files_of(path.relative_to(run / "benchmarks"))
-        core_s[files] = core_s.get(files, 0.0) + last
+        core_s[files] = core_s.get(files, 0.0) + job_core_s
     for path in sorted(run.rglob("*")):
         if path.is_file():
             files = _files_of(path.relative_to(run))
             megabytes[files] = megabytes.get(files, 0.0) + path.stat().st_size / 1e6
     hardware = describe()
-    return [
-        (part, files, f"{core_s[files]:.1f}", f"{megabytes[files]:.1f}", hardware)
-        for files in sorted(core_s)
-    ]
+    rows = []
+    for files in sorted(core_s):
+        rows.append((part, files, f"{core_s[files]:.1f}", f"{megabytes[files]:.1f}", hardware))
+    return rows
 
 
 def _files_of(path: Path) -> str:
-    """The column `files` of a file of a run, or of the times of its job."""
+    """Return what the column `files` says of a file of a run, or of the times of its job."""
     if path.parts[0] != "views":
         return SHARED
     group, fold, _ = path.stem.split("-")
@@ -112,7 +118,7 @@ def _files_of(path: Path) -> str:
 def write(folder: str | Path, out: str | Path) -> None:
     """Write the costs of the parts whose runs are in a folder.
 
-    Of other parts the table keeps its rows.
+    The table keeps the rows of all other parts.
     """
     path = Path(out) / NAME
     kept = {}
@@ -121,6 +127,8 @@ def write(folder: str | Path, out: str | Path) -> None:
             kept[row["part"], row["files"]] = tuple(row[name] for name in COLUMNS)
     for part in PARTS:
         if (Path(folder) / run_name(part)).is_dir():
-            kept |= {(row[0], row[1]): row for row in measured(part, folder)}
+            for part_row in measured(part, folder):
+                _, files, *_ = part_row
+                kept[part, files] = part_row
     order = sorted(kept, key=lambda name: (PARTS.index(name[0]), name[1]))
     write_csv(path, COLUMNS, [kept[name] for name in order])
