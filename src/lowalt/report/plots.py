@@ -17,8 +17,10 @@ NARROW_IN = 4.9
 
 
 class Plot(NamedTuple):
-    """Name of its files, description for screen readers, its SVG, the rows of its table, and its
-    SVG for telephones, "" where it has none.
+    """A figure of the page.
+
+    name: of its files; description: for screen readers; svg: for wide windows; rows: of its table;
+    narrow_svg: for telephones, "" if the plot has only one SVG.
     """
 
     name: str

@@ -38,9 +38,9 @@ class Values(NamedTuple):
 def _above(scores: np.ndarray, others: np.ndarray) -> np.ndarray:
     """Share (n,) of `others` (m,) that lie below each of `scores` (n,); equal ones count half."""
     ordered = np.sort(others)
-    return (
-        np.searchsorted(ordered, scores, "left") + np.searchsorted(ordered, scores, "right")
-    ) / (2 * len(ordered))
+    below = np.searchsorted(ordered, scores, "left")
+    below_or_equal = np.searchsorted(ordered, scores, "right")
+    return (below + below_or_equal) / (2 * len(ordered))
 
 
 def ranked(scores: np.ndarray, held_out: np.ndarray) -> tuple[float, np.ndarray]:
@@ -88,7 +88,9 @@ def values_of(track: Track, parts: list[Predictions], classes: tuple[str, ...]) 
         label = classes.index(UNKNOWN)
         found = [ranked(part.probabilities[:, label], part.label == label) for part in parts]
         shares = [2 * share - area for area, share in found]
-    return Values(model_shares(parts[0].motion, shares)[2], *models_of(track, parts[0], classes))
+    _, _, values = model_shares(parts[0].motion, shares)
+    weight, subtypes = models_of(track, parts[0], classes)
+    return Values(values, weight, subtypes)
 
 
 def difference(track: Track, first: Values, second: np.ndarray) -> Interval:
@@ -113,10 +115,11 @@ def headline(track: Track, found: Values) -> Interval:
     return Interval(value, max(low, 0.0), min(high, 100.0))
 
 
-def kept_share(part: Predictions, label: int, accepted: float = 0.95) -> float:
+def rejected_share(part: Predictions, label: int, accepted: float = 0.95) -> float:
     """Return the share of the held-out class that is rejected.
 
-    The threshold accepts a share `accepted` of the trained classes. label: of the held-out class.
+    The threshold accepts a share `accepted` of the samples of trained classes. label: of the
+    held-out class.
     """
     scores = part.probabilities[:, label]
     held_out = part.label == label
@@ -146,7 +149,8 @@ def scores(track: Track, answers: list[np.ndarray], baselines: dict[str, np.ndar
         more |= by_subtype(found.values, found.weight, found.subtypes)
     if track.headline == "AUROC":
         label = classes.index(UNKNOWN)
-        more["rejected_percent"] = 100 * float(np.mean([kept_share(part, label) for part in parts]))
+        rejected = [rejected_share(part, label) for part in parts]
+        more["rejected_percent"] = 100 * float(np.mean(rejected))
     return {
         "track": track.name,
         "headline": track.headline,

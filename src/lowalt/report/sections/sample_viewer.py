@@ -14,14 +14,17 @@ from lowalt.targets.cloud import read
 def viewed(
     shards: ShardSet, numbers: list[int], remaker: Remaker | None
 ) -> Iterator[viewer.ViewedSample]:
-    """Yield samples of a data set by their numbers; remaker: makes signals again, None for a data
-    set that does not say how.
+    """Yield samples of a data set by their numbers.
+
+    remaker: makes signals again, None for a data set that does not say how.
     """
     effects = (shards.index.get("echo") or {}).get("effects")
     effect = "the scene's effects" if effects else viewer.WITHOUT
     for number in numbers:
         record = shards.record(number)
-        signal = remaker.signal(record) if remaker else None
+        signal = None
+        if remaker is not None:
+            signal = remaker.signal(record)
         yield viewer.ViewedSample(effect, record, shards.tile(number), signal)
 
 
@@ -36,9 +39,9 @@ def values(run: ReportedRun) -> dict:
     keys = {shards.keys[number].decode() for number in numbers}
     echo = shards.index.get("echo")
     # The effects of a stranger's run may be code, so no page runs them.
-    remaker = (
-        opened(run.inputs.path("index")) if echo and not own_effects(echo["effects"]) else None
-    )
+    remaker = None
+    if echo and not own_effects(echo["effects"]):
+        remaker = opened(run.inputs.path("index"))
     return viewer.shown(
         viewed(shards, numbers, remaker),
         shards.renderer,
