@@ -5,6 +5,8 @@ import math
 
 import pytest
 
+import kept_records
+from lowalt.targets import records
 from meshes import write_bird, write_quad
 from skips import Skips
 
@@ -34,6 +36,8 @@ LONG = (
     "test_targets_more",
 )
 
+
+records.merge = kept_records.once(records.merge)
 
 # Imports make millions of objects that stay: looking through them for garbage took a tenth of the
 # tests' time.
