@@ -71,6 +71,19 @@ def pytest_collection_finish():
     gc.enable()
 
 
+@pytest.fixture(scope="session", autouse=True)
+def kept_clouds():
+    """Data sets and explanations of equal records share their clouds; tests of clouds do not."""
+    from lowalt.scene import explanation
+    from lowalt.shards import dataset
+
+    places = ((dataset, "made_cloud"), (dataset, "made_surfaces"), (explanation, "make"))
+    with pytest.MonkeyPatch.context() as patch:
+        for module, name in places:
+            patch.setattr(module, name, kept_records.once_without_files(getattr(module, name)))
+        yield
+
+
 @pytest.fixture
 def mlcroissant(monkeypatch, tmp_path):
     """Croissant's reference implementation, unpacking into a folder of the test's own.

@@ -238,6 +238,7 @@ def test_a_folder_that_is_no_set_becomes_one_by_a_file(tmp_path, capsys, library
         recordings(tmp_path)
 
 
+@pytest.mark.slow
 def test_each_network_says_something_of_every_labelled_window(tmp_path):
     """Two networks of two steps each: what they say is of no use, where it stands is."""
     (tmp_path / "inputs/vehicle_24ghz").mkdir(parents=True)

@@ -1,24 +1,39 @@
-"""Records of targets that are merged and checked once per process: every data set of a test reads
-the forty shipped ones, and their check builds forty models.
+"""What tests make again and again from equal records is made once per process: the checks of the
+forty shipped records, for which their models are built, and the clouds of data sets.
 """
 
 import functools
 import pickle
 from collections.abc import Callable
+from typing import Any
 
 
-def once(merge: Callable[..., dict]) -> Callable[..., dict]:
-    """Return `merge`, which runs once for equal arguments; each call has a copy of its own.
+def once(make: Callable[..., Any]) -> Callable[..., Any]:
+    """Return a function that calls `make` once for equal arguments; each call has a copy of its own.
 
-    A refusal is not kept, and changed code is not noticed: a test that plants a fault in a model
-    calls the model itself.
+    An error is not kept, and changed code is not noticed: tests of models call them directly.
     """
 
     @functools.lru_cache(maxsize=1000)
     def kept(given: bytes) -> bytes:
-        return pickle.dumps(merge(*pickle.loads(given)))
+        return pickle.dumps(make(*pickle.loads(given)))
 
-    def merged(row: dict, record: dict, where: str) -> dict:
-        return pickle.loads(kept(pickle.dumps((row, record, where))))
+    @functools.wraps(make)
+    def made(*given: Any) -> Any:
+        return pickle.loads(kept(pickle.dumps(given)))
 
-    return merged
+    return made
+
+
+def once_without_files(make: Callable[..., Any]) -> Callable[..., Any]:
+    """As `once`, of a function of (record, inputs, seed); what a record makes from files is made
+    anew, because files change.
+    """
+    kept = once(make)
+
+    @functools.wraps(make)
+    def made(record: dict, *sources: Any) -> Any:
+        of_files = record["source"] in ("mesh", "mocap")
+        return (make if of_files else kept)(record, *sources)
+
+    return made
