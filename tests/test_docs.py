@@ -3,6 +3,7 @@ site links them.
 """
 
 import argparse
+import functools
 import html
 import importlib
 import json
@@ -12,7 +13,7 @@ import shlex
 import subprocess
 import sys
 import tomllib
-from importlib.metadata import packages_distributions
+from importlib import metadata
 from pathlib import Path
 
 import benchmark_picture
@@ -201,6 +202,12 @@ def test_a_missing_package_is_asked_for_by_its_own_name():
     assert not from_index
 
 
+@functools.cache
+def packages_of_modules():
+    """The packages that offer each module, read from every installed package's files."""
+    return metadata.packages_distributions()
+
+
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_a_page_that_imports_a_package_beyond_the_set_up_says_how_to_install_it(page):
     """Also where only the program in `examples/` imports it that a command of the page runs."""
@@ -223,7 +230,7 @@ def test_a_page_that_imports_a_package_beyond_the_set_up_says_how_to_install_it(
     known += [need for name in filter(None, named.split(",")) for need in extras[name]]
     known += re.findall(r"pip install[^`\n]* (\w+)`", text)
     have = {re.match(r"[\w-]+", need)[0].lower() for need in known} | {"lowalt"}
-    offers = packages_distributions()
+    offers = packages_of_modules()
     # A package that the page itself makes.
     have |= set(re.findall(r'title="[^"]*?(\w+)/__init__\.py"', text))
     sources = {

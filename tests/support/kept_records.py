@@ -16,10 +16,12 @@ def once(make: Callable[..., Any]) -> Callable[..., Any]:
 
     @functools.lru_cache(maxsize=1000)
     def kept(given: bytes) -> bytes:
+        """What `make` returns for pickled arguments, pickled."""
         return pickle.dumps(make(*pickle.loads(given)))
 
     @functools.wraps(make)
     def made(*given: Any) -> Any:
+        """A copy of what was made."""
         return pickle.loads(kept(pickle.dumps(given)))
 
     return made
@@ -33,6 +35,7 @@ def once_without_files(make: Callable[..., Any]) -> Callable[..., Any]:
 
     @functools.wraps(make)
     def made(record: dict, *sources: Any) -> Any:
+        """A copy of what was made, or of files something new."""
         of_files = record["source"] in ("mesh", "mocap")
         return (make if of_files else kept)(record, *sources)
 

@@ -227,7 +227,9 @@ def test_a_record_that_its_numbers_contradict_is_refused(name, tmp_path):
         ("uint8 .cu8", {}),
     ],
 )
-@pytest.mark.parametrize("kind, snr", [("drone", 30), ("drone", 0), ("walker", 0)])
+@pytest.mark.parametrize(
+    "kind, snr", [("drone", 30), pytest.param("drone", 0, marks=pytest.mark.slow), ("walker", 0)]
+)
 def test_a_right_record_is_never_refused(layout, keys, kind, snr, tmp_path):
     values = echo(kind, snr)
     path = WRITTEN["written"](layout, values, tmp_path)
