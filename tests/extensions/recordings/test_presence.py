@@ -66,6 +66,34 @@ def test_a_drift_slower_than_any_target_is_none():
     )
 
 
+def test_a_weaker_line_counts_where_it_continues_one_that_counts():
+    rng = np.random.default_rng(4)
+    time = np.arange(400)
+    twin = replace(LOOKING, detect_db=20.0)
+    noise = rng.standard_normal((40, 400)) + 1j * rng.standard_normal((40, 400))
+
+    def line(amplitude: float, cycles: float) -> np.ndarray:
+        """A line of a window by its amplitude and its cycles per symbol."""
+        return amplitude * np.exp(2j * np.pi * cycles * time)
+
+    strong = 1.6
+    weak = 0.6
+    alone = noise.copy()
+    alone[20:24] += line(weak, 0.4)
+    assert not present(alone, twin).any()
+    # 3 m/s^2 change a speed by 0.4 m/s from a window to the next: 0.02 cycles per symbol.
+    track = noise.copy()
+    for number, (amplitude, cycles) in enumerate(
+        [(weak, 0.36), (weak, 0.38), (strong, 0.4), (weak, 0.41), (weak, 0.43)]
+    ):
+        track[20 + number] += line(amplitude, cycles)
+    assert present(track, twin).nonzero()[0].tolist() == [20, 21, 22, 23, 24]
+    elsewhere = noise.copy()
+    elsewhere[22] += line(strong, 0.4)
+    elsewhere[23] += line(weak, 0.6)
+    assert present(elsewhere, twin).nonzero()[0].tolist() == [22]
+
+
 def test_the_floor_between_lines_is_the_mean_of_the_noise_for_a_window_as_for_many():
     rng = np.random.default_rng(1)
     for count in (1, 30):

@@ -18,6 +18,14 @@ QUIET_SHARE = 0.1
 """Share of the windows in which a speed is taken to be empty."""
 FLOOR_MPS = 0.5
 """Speeds to either side over which the noise floor is smooth."""
+CONTINUES_DB = 12.0
+"""Level over the noise floor of a line that continues one of the window before or after, where
+`detect_db` is higher.
+"""
+CONTINUES_MPS2 = 3.0
+"""Change of a line's speed from a window to the next, over their distance: cars speed up and brake
+by as much.
+"""
 ENOUGH = 20
 """Least number of windows with which a constant line can be told from a target."""
 BETWEEN_SHARE = 0.25
@@ -124,8 +132,9 @@ def present(intervals: np.ndarray, twin: Twin, noise: np.ndarray | None = None) 
     window, that stands `detect_db` above the recording's own noise floor.
 
     Where targets move (slowest_mps above 0) it is the floor at the line's own speed, in the other
-    windows, and the line is at or above slowest_mps. Where they may hover it is the floor between
-    lines. A recording of `ENOUGH` windows through which a target passes is also judged by its quiet
+    windows, and the line is at or above slowest_mps; a line of `CONTINUES_DB` is enough that
+    continues one of a window next to it. Where they may hover it is the floor between lines. A
+    recording of `ENOUGH` windows through which a target passes is also judged by its quiet
     time, so that hum next to it is no target.
     noise: intervals (m, symbols) of the receiver's noise alone, hum included, where they are known:
     a line must stand above their mean at its own speed, too.
@@ -140,7 +149,11 @@ def present(intervals: np.ndarray, twin: Twin, noise: np.ndarray | None = None) 
         return (power[:, heard] / np.maximum(floor[heard], 1e-300)).max(axis=1)
 
     if twin.slowest_mps:
-        return over(noise_floor(quiet, step_mps)) >= level
+        floor = np.maximum(noise_floor(quiet, step_mps)[heard], 1e-300)
+        window_s = twin.symbols * twin.symbol_interval_s
+        weaker = min(level, 10 ** (CONTINUES_DB / 10))
+        reach = round(CONTINUES_MPS2 * window_s / step_mps)
+        return _continued(power[:, heard] / floor, level, weaker, reach)
     if noise is not None:
         return (
             over(
@@ -153,6 +166,24 @@ def present(intervals: np.ndarray, twin: Twin, noise: np.ndarray | None = None) 
         passing = over(noise_floor(quiet, step_mps))
         if passing.max() >= PASSES * level and np.median(passing) < level:
             found &= passing >= level
+    return found
+
+
+def _continued(over: np.ndarray, level: float, weaker: float, reach: int) -> np.ndarray:
+    """Which windows (n,) bool of the ratios `over` (n, speeds) hold a line of at least `level`, or
+    one of at least `weaker` that continues, within `reach` cells, a line of a window next to it
+    that is found.
+
+    Source: the two thresholds of Canny 1986, IEEE Trans. Pattern Anal. Mach. Intell. 8(6).
+    """
+    found = over.max(axis=1) >= level
+    lines = over >= weaker
+    near = maximum_filter1d(lines.astype(np.uint8), 2 * reach + 1, axis=1, mode="constant") > 0
+    continues = (lines[1:] & near[:-1]).any(axis=1)
+    for later in range(1, len(found)):
+        found[later] |= found[later - 1] and continues[later - 1]
+    for earlier in range(len(found) - 2, -1, -1):
+        found[earlier] |= found[earlier + 1] and continues[earlier]
     return found
 
 
