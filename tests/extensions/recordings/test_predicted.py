@@ -9,6 +9,7 @@ from scipy.io import wavfile
 
 from lowalt.extensions.recordings import answers, predicted
 from lowalt.extensions.recordings.record import record
+from lowalt.extensions.recordings.window_samples import rendered
 from lowalt.recognition.runs import opened
 
 
@@ -58,9 +59,9 @@ def test_what_predict_answers_of_windows_with_a_target_is_of_their_tracks(tmp_pa
     time = np.arange(24 * rate) / rate
     rng = np.random.default_rng(0)
     line = np.cos(2 * np.pi * 960.0 * time) * ((time >= 4.0) & (time < 8.0))
-    wavfile.write(
-        tmp_path / "a.wav", rate, (3000 * line + rng.normal(0, 90, len(time))).astype("i2")
-    )
+    hum = np.cos(2 * np.pi * 300.0 * time)
+    samples = 3000 * line + 200 * hum + rng.normal(0, 90, len(time))
+    wavfile.write(tmp_path / "a.wav", rate, samples.astype("i2"))
     about = record(
         {"file": "a.wav", "carrier_hz": 24e9, "channel": "real", "label": "Vehicle"}, tmp_path, "a"
     )
@@ -69,6 +70,18 @@ def test_what_predict_answers_of_windows_with_a_target_is_of_their_tracks(tmp_pa
     odd = 14
     shares[odd] = [0.94, 0.02, 0.02, 0.02]
     monkeypatch.setattr(answers, "probabilities", lambda *_: shares)
+    seen = []
+
+    def noted(intervals, *others):
+        """What is shown to the network, and its images."""
+        seen.append(intervals)
+        return rendered(intervals, *others)
+
+    monkeypatch.setattr(answers, "rendered", noted)
     found = answers.answers(trained, settings, about, "a")
     assert found.present.nonzero()[0].tolist() == list(range(10, 20))
     assert set(found.outcomes(list(trained.classes))) == {"nothing", "Vehicle"}
+    # The network sees the line of 960 Hz, but not the hum of 300 Hz; a cell is 2.5 Hz wide.
+    power = np.median(np.abs(np.fft.fft(seen[0][10:20], axis=1)) ** 2, axis=0)
+    around = np.median(power[100:500])
+    assert power[384] > 1e4 * around and power[119:122].max() < 10 * around

@@ -13,6 +13,7 @@ from lowalt.extensions.recordings.presence import (
     floor_between,
     noise_floor,
     present,
+    without_hum,
 )
 from lowalt.extensions.recordings.twin import Twin, radars
 
@@ -56,6 +57,36 @@ def test_coloured_noise_and_a_line_that_stays_are_no_target():
     assert present(stays[5:6], LOOKING, coloured[1:2]).all()
     assert present(stays[:1], LOOKING, coloured[1:2]).all()
     assert not present(stays[:1], LOOKING, stays[1:2]).any()
+
+
+def test_a_line_that_stays_is_taken_out_of_windows_and_a_target_is_not():
+    rng = np.random.default_rng(6)
+    time = np.arange(400)
+    noise = rng.standard_normal((40, 400)) + 1j * rng.standard_normal((40, 400))
+
+    def line(cycles: float) -> np.ndarray:
+        """A line of a window by its cycles per symbol, 26 dB above the noise of a cell."""
+        return 1.4 * np.exp(2j * np.pi * cycles * time)
+
+    hum = noise + line(0.25)
+    passes = hum.copy()
+    # 0.025 cycles per symbol are 0.47 m/s, next to what is taken out of windows as too slow.
+    for cycles in (0.025, 0.5):
+        passes[7:9] += line(cycles)
+    cleaned = without_hum(passes, LOOKING)
+
+    def power(intervals: np.ndarray, cycles: float) -> np.ndarray:
+        """Power of each window at a speed, over that of the noise."""
+        return np.abs(np.fft.fft(intervals, axis=1)[:, round(400 * cycles)]) ** 2 / 800
+
+    assert np.median(power(passes, 0.25)) > 300 and np.median(power(cleaned, 0.25)) < 3
+    for cycles in (0.025, 0.5):
+        np.testing.assert_allclose(
+            power(cleaned, cycles)[7:9], power(passes, cycles)[7:9], rtol=0.1
+        )
+    few = passes[: ENOUGH - 1]
+    assert without_hum(few, LOOKING) is few
+    assert without_hum(passes, replace(LOOKING, slowest_mps=0.0)) is passes
 
 
 def test_a_drift_slower_than_any_target_is_none():

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from lowalt.extensions.recordings.files import read
-from lowalt.extensions.recordings.presence import beyond_mps, present
+from lowalt.extensions.recordings.presence import beyond_mps, present, without_hum
 from lowalt.extensions.recordings.record import Record
 from lowalt.extensions.recordings.twin import Twin, radars
 from lowalt.extensions.recordings.window_samples import Windows, facts, rendered
@@ -98,7 +98,10 @@ def answers(trained: Trained, settings: dict, record: Record, where: str) -> Ans
     baseband = read(record)
     found = looks(record, twin, baseband)
     intervals = found.intervals.astype(np.complex64)
-    images = rendered(intervals, twin, Images.from_settings(settings["images"]), trained.size)
+    there = ~(found.clipped | found.lost)
+    shown = intervals.copy()
+    shown[there] = without_hum(intervals[there], twin)
+    images = rendered(shown, twin, Images.from_settings(settings["images"]), trained.size)
     count = len(intervals)
     numbers = np.arange(len(intervals))
     samples = Windows(
@@ -108,7 +111,6 @@ def answers(trained: Trained, settings: dict, record: Record, where: str) -> Ans
     values = baseband.values if twin.channel == "complex" else baseband.values.real
     beyond = beyond_mps(values, baseband.rate_hz, twin, count)
     starts = numbers * twin.symbols * twin.symbol_interval_s
-    there = ~(found.clipped | found.lost)
     empty = (
         intervals[_empty(record, starts, twin, where, there)]
         if record.empty_s and not twin.slowest_mps
