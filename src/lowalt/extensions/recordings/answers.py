@@ -129,8 +129,8 @@ def followed(shares: np.ndarray, starts_s: np.ndarray) -> np.ndarray:
     """Return class probabilities (n, classes) of windows with a target as those of its track: the
     geometric mean over the windows within `FOLLOWED_S`, of which no class is below `LEAST_SHARE`.
 
-    starts_s: (n,) s, rising. What drives past or walks is the same thing a second later, although a window
-    may show it abeam, or on its turn.
+    starts_s: (n,) s, rising. What drives past or walks is the same thing a second later, although a
+    window may show it abeam, or on its turn.
     """
     within_s = FOLLOWED_S * (1 + 1e-9)
     first = np.searchsorted(starts_s, starts_s - within_s)

@@ -188,27 +188,24 @@ def present(intervals: np.ndarray, twin: Twin, noise: np.ndarray | None = None) 
         return (power[:, heard] / np.maximum(floor[heard], 1e-300)).max(axis=1)
 
     if twin.slowest_mps:
-        floor = noise_floor(quiet, step_mps)
-        if noise is not None:
-            floor = np.maximum(floor, _known(quiet))
-        floor = np.maximum(floor[heard], 1e-300)
+        floor = np.maximum(noise_floor(quiet, step_mps)[heard], 1e-300)
         window_s = twin.symbols * twin.symbol_interval_s
         weaker = min(level, 10 ** (CONTINUES_DB / 10))
         reach = round(CONTINUES_MPS2 * window_s / step_mps)
         return _continued(power[:, heard] / floor, level, weaker, reach)
     if noise is not None:
-        return over(np.maximum(floor_between(quiet), _known(quiet))) >= level
+        return (
+            over(
+                np.maximum(floor_between(quiet), maximum_filter(quiet.mean(axis=0), 3, mode="wrap"))
+            )
+            >= level
+        )
     found = over(floor_between(quiet)) >= level
     if len(power) >= ENOUGH:
         passing = over(noise_floor(quiet, step_mps))
         if passing.max() >= PASSES * level and np.median(passing) < level:
             found &= passing >= level
     return found
-
-
-def _known(power: np.ndarray) -> np.ndarray:
-    """Mean power (speeds,) of windows (n, speeds) of known noise, its lines a cell wider."""
-    return maximum_filter(power.mean(axis=0), 3, mode="wrap")
 
 
 def _continued(over: np.ndarray, level: float, weaker: float, reach: int) -> np.ndarray:

@@ -26,8 +26,8 @@ class Receiver:
     wander_db: rms of a slow change of the amplitude; leak_db: a constant, over the echo; hum_db and
     hum_hz: a line, over the echo.
 
-    May be left out: hum_lines, how many harmonics the line has below half the rate, each
-    1 / number as strong; highpass_hz, corner of a Butterworth high pass, 0 Hz for none; clip_rms,
+    May be left out: hum_lines, how many harmonics the line has, each 1 / number as
+    strong; highpass_hz, corner of a Butterworth high pass, 0 Hz for none; clip_rms,
     the largest amplitude over the rms of all samples, 0 for no limit; flicker_slope, exponent of
     the slow noise's fall; gain_control, the share in decibels by which an automatic gain makes
     strong and weak stretches alike, and gain_s, over which time it measures; bits, of the converter
@@ -110,7 +110,6 @@ def received(
     hum = sum(
         np.cos(number * (2 * np.pi * settings.hum_hz * time + angle[1])) / number
         for number in range(1, round(settings.hum_lines) + 1)
-        if number == 1 or number * settings.hum_hz < rate_hz / 2
     )
     hum = np.sqrt(power) * 10 ** (settings.hum_db / 20) * hum
     result = add_noise(result, settings.snr_db, rng, power) + flicker + static + hum

@@ -248,11 +248,6 @@ def stretch(values: np.ndarray, twin: Twin, seconds: float) -> np.ndarray:
     return signal[MARGIN : MARGIN + math.floor(seconds / twin.symbol_interval_s + 1e-6)]
 
 
-LEARNED_DB = 14.0
-"""Level over the noise floor at which a moving target is learned, where `detect_db` is higher:
-recordings hold such windows next to stronger ones (`presence.CONTINUES_DB`). Noise alone is hardly
-ever as strong.
-"""
 REDRAWS = 8
 """Largest number of receivers drawn for one echo, and of echoes drawn for a window, until its
 target is above the noise. The last one is kept anyway."""
@@ -269,8 +264,7 @@ class Drawn(NamedTuple):
 
 def _drawn(twin: Twin, receiver: dict, signal: np.ndarray, keys: tuple) -> Drawn:
     """The interval of an echo at a receiver. Where targets move, so that they are not heard all the
-    time, the receiver is drawn again while no target that can be learned is present."""
-    learned = replace(twin, detect_db=min(twin.detect_db, LEARNED_DB))
+    time, the receiver is drawn again while no target is present."""
     seconds = twin.symbols * twin.symbol_interval_s
     for redraw in range(REDRAWS):
         both = []
@@ -279,7 +273,7 @@ def _drawn(twin: Twin, receiver: dict, signal: np.ndarray, keys: tuple) -> Drawn
             both.append(
                 coherent_intervals(stretch(values, twin, seconds), twin.symbols, slow=twin.slow)
             )
-        found = not twin.slowest_mps or bool(present(both[0], learned, both[-1]).all())
+        found = not twin.slowest_mps or bool(present(both[0], twin, both[-1]).all())
         if found:
             break
     return Drawn(both[0][0], both[-1][0], found)
