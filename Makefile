@@ -6,14 +6,16 @@ BIN := .venv/bin
 comma := ,
 # Package sets: for data; with training, which is most of the bytes; with tests and linters.
 BASE := .venv/set-up-data
+TRAINING := .venv/set-up-training
+COMPILED := .venv/set-up-compiled
 SETUP := .venv/set-up
 TESTING := .venv/set-up-tests
 BYTECODE := .venv/set-up-bytecode
+DOCS := .venv/set-up-docs
 SNAKEMAKE := $(BIN)/snakemake --cores $(CORES)
 
 # The small tables of a run that `make reference` stores.
 TABLES := accuracy.csv stages.csv subtypes.csv comparisons.csv confusion.csv seeds.csv orderings.csv
-DOCS := .venv/set-up-docs
 
 .PHONY: all default data real measured cost accuracy-cost benchmark study test test-slow fuzz lint docs check-bytes reference help
 
@@ -37,52 +39,60 @@ of_extra = $$($(BIN)/python -c 'import tomllib; print(*tomllib.load(open("pyproj
 
 $(BASE): pyproject.toml envs/constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "error: $(PYTHON) is older than Python 3.11; set PYTHON=..." >&2; exit 1; }
-	test -x $(BIN)/python || $(PYTHON) -m venv --without-pip .venv
-	$(PYTHON) -m pip --python $(BIN)/python install --quiet --disable-pip-version-check -c envs/constraints.txt uv \
+	@echo "set-up: making the virtual environment .venv and its installer"
+	@test -x $(BIN)/python || $(PYTHON) -m venv --without-pip .venv
+	@$(PYTHON) -m pip --python $(BIN)/python install --quiet --disable-pip-version-check -c envs/constraints.txt uv \
 		2>/dev/null || { $(PIP) -c envs/constraints.txt uv || true; }
-	$(call install,-e '.[workflow$(comma)cost]' pip)
-	rm -f $(SETUP) $(TESTING) $(DOCS) $(BYTECODE)
-	touch $@
+	@echo "set-up: installing the packages that make data"
+	@$(call install,-e '.[workflow$(comma)cost]' pip)
+	@rm -f $(TRAINING) $(COMPILED) $(SETUP) $(TESTING) $(DOCS) $(BYTECODE)
+	@touch $@
 
-# Compile the machine code of the data stages while packages are downloaded, so that neither first calls nor parallel
-# tests wait for it. Making one sample compiles nearly all of it.
-COMPILED := .venv/compiled
-SAMPLE = { $(BIN)/lowalt sample 'DJI Mini 2' 0 --out .venv/sample >.venv/kernels.log 2>&1; ended=$$?; touch $(COMPILED); exit $$ended; }
+$(TRAINING): $(BASE)
+	@echo "set-up: installing the packages of training, of which PyTorch is the largest"
+	@$(call install,$(call of_extra,recognition))
+	@touch $@
+
+# Neither first calls nor parallel tests wait for machine code. Making one sample compiles nearly all of it.
+$(COMPILED): $(BASE)
+	@echo "set-up: compiling the machine code of the data stages for this processor"
+	@$(BIN)/lowalt sample 'DJI Mini 2' 0 --out .venv/sample >.venv/kernels.log 2>&1 || { cat .venv/kernels.log >&2; exit 1; }
+	@touch $@
+
+# Machine code is compiled while packages are downloaded.
 $(SETUP): $(BASE)
-	@rm -f $(COMPILED)
-	$(SAMPLE) & sampling=$$!; { $(call install,$(call of_extra,recognition)); } && \
-		{ wait $$sampling || { cat .venv/kernels.log >&2; exit 1; }; }
-	touch $@
+	@$(MAKE) --no-print-directory -j 2 $(TRAINING) $(COMPILED)
+	@touch $@
 
 $(TESTING): $(SETUP)
-	$(call install,$(call of_extra,test) $(call of_extra,tensorboard) $(call of_extra,export) $(call of_extra,slurm) $(call of_extra,notebooks) $(call of_extra,methods) $(call of_extra,weights) $(call of_extra,town) $(call of_extra,tools) $(call of_extra,docs) $(call of_extra,lint))
-	touch $@
+	@echo "set-up: installing the packages of the tests, the documents and the linters"
+	@$(call install,$(call of_extra,test) $(call of_extra,tensorboard) $(call of_extra,export) $(call of_extra,slurm) $(call of_extra,notebooks) $(call of_extra,methods) $(call of_extra,weights) $(call of_extra,town) $(call of_extra,tools) $(call of_extra,docs) $(call of_extra,lint))
+	@touch $@
 
 # Write the bytecode of the tests and their imports once, not in both test processes at the same time. The tests report
 # files that cannot be read.
 $(BYTECODE): $(TESTING)
-	$(BIN)/python -m pytest --collect-only -q >.venv/bytecode.log 2>&1 || true
-	touch $@
+	@echo "set-up: compiling the bytecode of the tests"
+	@$(BIN)/python -m pytest --collect-only -q >.venv/bytecode.log 2>&1 || true
+	@touch $@
 
 $(DOCS): $(BASE)
-	$(call install,$(call of_extra,docs))
-	touch $@
+	@echo "set-up: installing the packages of the documents"
+	@$(call install,$(call of_extra,docs))
+	@touch $@
 
-# Missing packages of training are installed while the data are made. The bytecode of torch takes ten seconds and is
+# Data are made while the packages of training are still being installed. The bytecode of torch takes ten seconds and is
 # written once here, not in two trainings at the same time.
 default: $(BASE)  ## the embedded default: data, training, evaluation, report in results/default
 	@test -e $(SETUP) || { \
-		$(MAKE) --no-print-directory -j 2 $(SETUP) meanwhile && \
+		$(MAKE) --no-print-directory -j 2 $(TRAINING) meanwhile && $(MAKE) --no-print-directory $(SETUP) && \
 		{ $(BIN)/python -c 'import lowalt.recognition.runs, lowalt.report.__main__' 2>.venv/bytecode.log & } }
 	$(SNAKEMAKE)
 
-# From a warm cache packages install in seconds; a separate Snakemake run pays only for a download. Clouds need no machine
-# code; jobs that need it would compile it again.
+# From a warm cache packages install in seconds; a separate Snakemake run pays only for a download.
 .PHONY: meanwhile ready
-meanwhile: $(BASE)
-	@for second in 1 2 3 4 5 6 7 8; do test -e $(SETUP) && exit; sleep 1; done; \
-	$(SNAKEMAKE) -- clouds && until test -e $(COMPILED); do sleep 1; done && \
-	{ sleep 1; test -e $(SETUP) || $(SNAKEMAKE) -- prepared; }
+meanwhile: $(COMPILED)
+	@test -e $(TRAINING) || $(SNAKEMAKE) -- prepared
 
 data: $(BASE)  ## the default's data set only, no training
 	$(SNAKEMAKE) -- data
@@ -154,6 +164,7 @@ reference: $(SETUP)  ## keep tables, manifests and pictures of finished runs
 	$(BIN)/python docs/scale_table.py --stages results/reference/default-stages.csv --costs results/reference/default-accuracy_cost.csv \
 		--schema workflow/schemas/config.schema.yaml --base config/default.yaml --overlays config/workstation.yaml config/paper.yaml --out results/reference/scale.csv
 	$(BIN)/python docs/tiles_picture.py results/default/shards/index.json design/pictures/tiles.png
+	$(BIN)/python docs/moving_picture.py --animation design/pictures/moving.webp --still design/pictures/moving.png
 
 # The picture of a sample is made by the command that its page shows.
 docs: $(DOCS)  ## the site of documents, site/index.html; a warning or a dead link is an error

@@ -1,12 +1,14 @@
-"""The pages of keys of the site, Markdown made of the two schemas: of the configuration, and of
-targets' records.
+"""Pages of the site's reference, Markdown made of the two schemas, of the configuration and of
+targets' records, and of the modules of effects.
 
 `docs/site_pages.py` makes them as the site is built.
 """
 
+import inspect
 from collections.abc import Iterator
 
 from lowalt.files.errors import InputError
+from lowalt.scene.effects import PLACES, module_of
 from lowalt.targets.record_schema import COMMON, figures
 
 CONFIGURATION_HEAD = """\
@@ -31,6 +33,13 @@ Made from `src/lowalt/targets/records.schema.yaml`. What a record is, and how to
 [Records of targets](../../design/targets.md), [A target of your own](../tutorials/target.md).
 
 """
+EFFECTS_HEAD = """\
+# Effects
+
+Made from the module of each effect: its law and the source of the law, in the order in which effects act. Parameters:
+[keys of the configuration](configuration.md#effects). What a scene is: [Scenes and effects](../scenes.md).
+"""
+
 INSIDE = {
     "Parts of a mesh (`parts`, each by its name)": "part",
     "Meshes of a part (`meshes`, a list)": "mesh",
@@ -104,6 +113,20 @@ def configuration_page(schema: dict) -> str:
             about = cell(entry.get("description", ""))
             blocks += f"\n## {key}\n\n{about[:1].upper()}{about[1:]}.\n\n{title}{table}"
     return f"{CONFIGURATION_HEAD}\n{single}{blocks}"
+
+
+def effects_page() -> str:
+    """Return the page of effects: a section for each place, with law and source of every effect."""
+    lines = [EFFECTS_HEAD]
+    for name, place in PLACES.items():
+        title = f"## {place.capitalize()}"
+        if title not in lines:
+            lines += [title, ""]
+        module = module_of(name)
+        law = inspect.cleandoc(module.__doc__)
+        source = f"{module.SOURCE[:1].upper()}{module.SOURCE[1:]}."
+        lines += [f"### {name}", "", law, "", f"*Source:* {source}", ""]
+    return "\n".join(lines)
 
 
 def records_page(schema: dict) -> str:

@@ -4,25 +4,42 @@ between all work.
 A file of docs/ has its path below docs/ in the site; every other file keeps its path in the
 repository. Markdown files of the navigation become pages. Any other file that a page links to is
 added to the site as it is. So the links that work in the repository work in the site, and every
-text stands once. Pages of keys are made of the schemas as the site is built: links to a schema lead
-to its page.
+text stands once. Pages of keys and of effects are made of the schemas and the effects' modules as
+the site is built: links to a schema, or to the list of effects, lead to its page. The viewer of
+samples is simulated as the site is built.
 """
 
+import functools
 import posixpath
 import re
 from pathlib import Path
 
-from key_pages import configuration_page, records_page
+from key_pages import configuration_page, effects_page, records_page
 from mkdocs.structure.files import File
 
+from lowalt.config.layers import overlaid
+from lowalt.files.package_plan import PACKAGE
 from lowalt.files.yaml_files import load_yaml
+from lowalt.report.viewer_page import viewer_of
 
 ROOT = Path(__file__).parents[1]
 DOCS = "docs/"
 CONFIGURATION = "workflow/schemas/config.schema.yaml"
 RECORDS = "src/lowalt/targets/records.schema.yaml"
-KEYS = {CONFIGURATION: "reference/configuration.md", RECORDS: "reference/records.md"}
-"""Schemas in the repository, and the pages of the site that are made of them."""
+EFFECTS = "src/lowalt/scene/effects/__init__.py"
+KEYS = {
+    CONFIGURATION: "reference/configuration.md",
+    RECORDS: "reference/records.md",
+    EFFECTS: "reference/effects.md",
+}
+"""Files in the repository, and the pages of the site that are made of them."""
+VIEWER = "viewer.md"
+VIEWED = ROOT / "config/viewer.yaml"
+"""The viewer's page of the site, and the configuration whose samples it shows."""
+MARK = "<!-- viewer -->"
+"""Where the viewer stands in its page."""
+SHARED = ("tables.js", "tables.css")
+"""Files of the report's page that the site uses as well."""
 LINK = re.compile(r"\]\(([^)#\s:]+)((?:#[^)\s]*)?)\)")
 """A link or picture to a file, and its anchor; addresses with a scheme have a colon."""
 
@@ -81,8 +98,13 @@ def pages(nav: list | dict | str) -> list[str]:
 
 def on_files(files, config):
     """Add the navigation's pages that lie outside docs/, and the files to which any page links."""
-    for schema, page in ((CONFIGURATION, configuration_page), (RECORDS, records_page)):
-        files.append(File.generated(config, KEYS[schema], content=page(load_yaml(ROOT / schema))))
+    made = {
+        CONFIGURATION: configuration_page(load_yaml(ROOT / CONFIGURATION)),
+        RECORDS: records_page(load_yaml(ROOT / RECORDS)),
+        EFFECTS: effects_page(),
+    }
+    for name, content in made.items():
+        files.append(File.generated(config, KEYS[name], content=content))
     named = [in_repository(uri) for uri in pages(config.nav) if uri not in KEYS.values()]
     wanted = set(named)
     for name in named:
@@ -91,6 +113,8 @@ def on_files(files, config):
             for path in linked((ROOT / name).read_text(), name)
             if path in named or path[-3:] != ".md"
         }
+    for name in SHARED:
+        files.append(File.generated(config, name, abs_src_path=str(PACKAGE / "report" / name)))
     for path in sorted(wanted):
         if files.get_file_from_path(in_site(path)) is None:
             files.append(File.generated(config, in_site(path), abs_src_path=str(ROOT / path)))
@@ -100,3 +124,14 @@ def on_files(files, config):
 def on_page_markdown(markdown, page, config, files):
     """Turn the links of a page."""
     return relinked(markdown, in_repository(page.file.src_uri))
+
+
+@functools.cache
+def viewer() -> str:
+    """Return the viewer of the site as HTML, made once per process."""
+    return viewer_of(overlaid([VIEWED]))
+
+
+def on_post_page(output, page, config):
+    """Put the viewer into its page, behind all that reads the texts of pages, such as the search."""
+    return output.replace(MARK, viewer()) if page.file.src_uri == VIEWER else output

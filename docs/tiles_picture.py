@@ -1,5 +1,5 @@
-"""The README's picture: one clean tile of each category out of a finished run, two by two at half
-size.
+"""The picture of the first page: one clean tile of each category out of a finished run, two by two
+at half size.
 
 python docs/tiles_picture.py INDEX OUT
 """

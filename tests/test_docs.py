@@ -3,7 +3,9 @@ site links them.
 """
 
 import argparse
+import html
 import importlib
+import json
 import os
 import re
 import shlex
@@ -13,14 +15,17 @@ import tomllib
 from importlib.metadata import packages_distributions
 from pathlib import Path
 
+import benchmark_picture
 import pytest
 import yaml
-from key_pages import configuration_page
+from key_pages import configuration_page, effects_page
 
 from lowalt.__main__ import main
-from lowalt.config.layers import load
+from lowalt.config.layers import load, overlaid
+from lowalt.extensions.benchmark import baseline_table
 from lowalt.files.errors import InputError, install_command
 from lowalt.scene.effects import PLACES
+from pages import browsed
 
 ROOT = Path(__file__).parent.parent
 PAGES = sorted([ROOT / "README.md", *ROOT.glob("docs/**/*.md")])
@@ -265,7 +270,7 @@ def test_every_link_and_every_file_of_a_command_exists(page):
 
 def test_every_function_on_the_page_of_physics_exists():
     named = re.findall(r"`(lowalt(?:\.\w+)+\.\w+)`", PHYSICS)
-    assert len(named) > 50
+    assert len(named) > 20
     for name in named:
         if name.startswith("lowalt.recognition"):
             pytest.importorskip("torch")
@@ -273,9 +278,15 @@ def test_every_function_on_the_page_of_physics_exists():
         assert callable(getattr(importlib.import_module(module), function)), name
 
 
-def test_every_effect_and_every_equation_stands_on_the_page_of_physics():
-    rows = re.findall(r"^\| `(\w+)` \| [^|]", PHYSICS, re.MULTILINE)
-    assert sorted(rows) == sorted(PLACES)
+def test_every_effect_has_its_law_and_its_source_on_the_page_of_effects():
+    sections = effects_page().split("\n### ")[1:]
+    assert [section.split("\n")[0] for section in sections] == list(PLACES)
+    for section in sections:
+        law, source = section.split("\n\n*Source:* ")
+        assert len(law.split()) > 8 and len(source.split()) > 2, section
+
+
+def test_every_equation_stands_on_the_page_of_physics():
     numbers = set()
     for first in re.findall(r"^\| (\d[\d, to]*) \|", PHYSICS, re.MULTILINE):
         for part in first.split(","):
@@ -342,9 +353,12 @@ def test_links_lead_to_the_same_files_in_the_site_as_in_the_repository(monkeypat
     assert site.relinked(f"[a](../{site.RECORDS})", "docs/index.md") == "[a](reference/records.md)"
 
 
-def test_the_site_builds_without_a_warning_and_with_every_link(tmp_path):
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    """The folder of the built site."""
     pytest.importorskip("mkdocs")
     pytest.importorskip("mkdocstrings")
+    folder = tmp_path_factory.mktemp("site")
     command = [
         sys.executable,
         "-m",
@@ -352,25 +366,83 @@ def test_the_site_builds_without_a_warning_and_with_every_link(tmp_path):
         "build",
         "--strict",
         "--site-dir",
-        str(tmp_path / "site"),
+        str(folder),
     ]
     environment = {**os.environ, "NO_MKDOCS_2_WARNING": "1"}
     run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, env=environment)
     assert run.returncode == 0, run.stderr
-    page = (tmp_path / "site/reference/library.html").read_text()
+    return folder
+
+
+def test_the_site_builds_without_a_warning_and_with_every_link(site):
+    page = (site / "reference/library.html").read_text()
     assert "An endless sequence of samples" in page
-    assert (tmp_path / "site/design/pictures/tiles.png").is_file()
-    assert (
-        "<code>models_per_chunk</code>"
-        in (tmp_path / "site/reference/configuration.html").read_text()
-    )
+    assert (site / "design/pictures/tiles.png").is_file()
+    assert "<code>models_per_chunk</code>" in (site / "reference/configuration.html").read_text()
     elsewhere = re.compile(r'<(?:script|link|img|iframe)[^>]+(?:src|href)="(?:https?:)?//')
-    asking = [
-        path.name
-        for path in (tmp_path / "site").rglob("*.html")
-        if elsewhere.search(path.read_text())
-    ]
+    asking = [path.name for path in site.rglob("*.html") if elsewhere.search(path.read_text())]
     assert not asking
+
+
+def told(found: str) -> list:
+    """What a page's script left in the attribute `data-said` of the body, read as JSON."""
+    return json.loads(html.unescape(re.search(r'data-said="(.*?)"', found, re.DOTALL)[1]))
+
+
+def test_the_site_s_viewer_shows_each_target_with_and_without_each_effect(site):
+    text = (site / "viewer.html").read_text()
+    assert (site / "viewer.html").stat().st_size < 5e6
+    script = """
+    const at = (name) => document.getElementById("viewer-" + name);
+    const tile = () => document.querySelector("image.tile").getAttribute("href");
+    const choose = (name, value) => { at(name).value = value; at(name).dispatchEvent(new Event("change")); };
+    const options = (name) => [...at(name).options].map((option) => option.value);
+    const seen = new Set();
+    for (const subtype of options("subtype")) {
+      choose("subtype", subtype);
+      for (const snr of options("snr")) {
+        choose("snr", snr);
+        for (const effect of options("effect")) { choose("effect", effect); seen.add(tile()); }
+      }
+    }
+    const truths = [...document.querySelectorAll("image.truth")].filter((image) => image.getAttribute("href").length > 200);
+    document.body.dataset.said = JSON.stringify([["subtype", "station", "snr", "effect"].map(options), seen.size, truths.length]);
+    """
+    choices, tiles, truths = told(browsed(site, text, script))
+    config = overlaid([ROOT / "config/viewer.yaml"])
+    subtypes, stations, snrs, effects = choices
+    assert set(subtypes) == set(config["targets"]["select"])
+    assert stations == [*config["network"]["stations"], "all"]
+    assert set(snrs) == {"8 dB", "no noise"}
+    assert effects == ["none", *config["effects"]]
+    assert tiles == len(subtypes) * len(snrs) * len(effects)
+    assert truths == len(config["network"]["stations"])
+
+
+def test_a_window_of_1280_pixels_shows_every_tab_and_the_benchmark_s_tables_sort(site):
+    script = """
+    const rows = () => [...document.querySelectorAll(".sortable table")[0].tBodies[0].rows];
+    const tabs = [...document.querySelectorAll(".md-tabs__link")].map((tab) => tab.getBoundingClientRect().right);
+    document.querySelectorAll(".sortable th button")[2].click();
+    const numbers = rows().map((row) => parseFloat(row.cells[2].textContent));
+    const heights = rows().map((row) => row.cells[2].getBoundingClientRect().height);
+    document.body.dataset.said = JSON.stringify([window.innerWidth, Math.max(...tabs), numbers, Math.max(...heights)]);
+    """
+    wide, last_tab, numbers, height = told(
+        browsed(site, (site / "benchmark.html").read_text(), script)
+    )
+    assert wide == 1280 and last_tab <= 1280
+    assert len(numbers) > 9 and numbers == sorted(numbers)
+    # A cell is one line.
+    assert height < 50
+
+
+def test_the_picture_of_the_benchmark_is_that_of_the_kept_table():
+    rows = baseline_table.read()
+    for name, narrow in (("benchmark.svg", False), ("benchmark-narrow.svg", True)):
+        assert (ROOT / "docs/pictures" / name).read_text() == benchmark_picture.picture(
+            rows, narrow
+        )
 
 
 def test_every_page_of_the_site_exists_and_every_page_is_in_the_site():
@@ -384,8 +456,9 @@ def test_every_page_of_the_site_exists_and_every_page_is_in_the_site():
             else [name for value in below for name in pages(value)]
         )
 
-    # Pages of keys are made as the site is built.
-    every_name = set(pages(nav)) - {"reference/configuration.md", "reference/records.md"}
+    # These pages are made as the site is built.
+    made = {f"reference/{name}.md" for name in ("configuration", "records", "effects")}
+    every_name = set(pages(nav)) - made
     named = {f"docs/{name}" if (ROOT / "docs" / name).is_file() else name for name in every_name}
     assert not [name for name in named if not (ROOT / name).is_file()]
     every = {page.relative_to(ROOT).as_posix() for page in [*PAGES, *ROOT.glob("design/*.md")]} - {

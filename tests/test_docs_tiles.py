@@ -1,5 +1,5 @@
-"""The README's picture: the clean tile of each class out of a data set, and four of them on one
-page.
+"""The picture of the first page: the clean tile of each class out of a data set, and four of them
+on one page.
 """
 
 import io

@@ -94,9 +94,9 @@ def test_an_effect(checkout, capsys, monkeypatch):
         "20 GHz: k 0.09611, alpha 0.9847",
     )
     assert capsys.readouterr().out.startswith("\n".join((*table, "80 GHz: k 1.167, alpha 0.7021")))
-    (line,) = [line for line in printed.splitlines() if line.startswith("rain.py ")]
+    (line,) = [line for line in printed.splitlines() if line.startswith("examples/rain.py ")]
     assert line.split()[1] == "named" and float(line.split()[2].rstrip("%")) > 0
-    assert "rain.py: ITU-R P.838-3" in printed
+    assert "examples/rain.py: ITU-R P.838-3" in printed
     wet = names["wet"].maker
     dry = names["dry"].maker
     rain = names["rain"]

@@ -15,7 +15,7 @@ from lowalt.commands.command_table import COMMANDS
 from lowalt.config.command import refusal, warn_in_one_line
 from lowalt.config.core_commands import CORE_COMMANDS, Command
 from lowalt.config.extensions import extensions_in_words, function_offered
-from lowalt.files.errors import InputError
+from lowalt.files.errors import InputError, in_plain_characters
 
 
 def command_line(asked: str) -> argparse.ArgumentParser:
@@ -68,7 +68,7 @@ def main(arguments: list[str] | None = None) -> int:
 
             text = as_json(answer.facts)
         if text:
-            print(text, flush=True)
+            print(in_plain_characters(text), flush=True)
     except BrokenPipeError:
         # The reader, such as `head`, has closed its end; Python would try again when it ends.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -108,8 +108,8 @@ def test_every_command_takes_the_classes_of_the_table_and_any_stations(tmp_path,
     ]
     assert f"<code>{sha256(tmp_path / 'index.json')}</code>" in text
     assert f"{count} base station" in text and f"<td>{scheme}</td>" in text
-    # A panel of the viewer for the echo and for each of the three spectra of each station.
-    assert [text.count(f">{station}: ") for station in stations] == [4] * count
+    # A panel of the viewer for the truth, the echo and each of the three spectra of each station.
+    assert [text.count(f">{station}: ") for station in stations] == [5] * count
     shown = json.loads(re.search(r'id="viewer-data">(.*?)</script>', text)[1])
     assert shown["classes"] == list(names)
     assert {sample["category"] for sample in shown["samples"]} == set(names)

@@ -1,9 +1,10 @@
-"""The tutorial on an extension runs as it is printed: its package is installed with pip into a
-virtual environment of its own, and what it adds is used.
+"""The tutorial on an extension runs as it is printed: the package of the example is installed with
+pip into a virtual environment of its own, and what it adds is used.
 """
 
 import os
 import shlex
+import shutil
 import subprocess
 import sys
 import venv
@@ -15,6 +16,8 @@ from followed_pages import FENCE, FOLDER, ROOT
 from lowalt.files.package_plan import PACKAGE
 
 BLOCKS = FENCE.findall((FOLDER / "extension.md").read_text())
+EXAMPLE = ROOT / "examples/extension"
+COPY = "cp -r examples/extension mist"
 LOSS = """
 import lowalt, numpy as np
 from lowalt.config.layers import overlaid
@@ -47,13 +50,14 @@ class Own(venv.EnvBuilder):
 
 @pytest.fixture(scope="module")
 def package(tmp_path_factory):
-    """A folder with the files that the page names, its package installed as the page says; returns
-    a function that runs a command line of the page there.
+    """A folder with the copied example and the files that the page names, the package installed as
+    the page says; returns a function that runs a command line of the page there.
     """
     folder = tmp_path_factory.mktemp("own")
+    assert COPY in lines()
+    shutil.copytree(EXAMPLE, folder / "mist")
     for _, title, block in BLOCKS:
-        if title:
-            (folder / title).parent.mkdir(parents=True, exist_ok=True)
+        if title and title != "entry":
             (folder / title).write_text(block)
     Own().create(folder / "environment")
     environment = {**os.environ, "PIP_NO_INDEX": "1"}
@@ -80,16 +84,18 @@ def lines() -> list[str]:
     return [line for kind, _, block in BLOCKS if kind == "sh" for line in block.splitlines()]
 
 
-def test_the_page_shows_the_files_of_the_example():
-    folder = ROOT / "examples/extension"
-    shown = {title.removeprefix("mist/"): block for _, title, block in BLOCKS if "mist/" in title}
-    kept = {path.relative_to(folder).as_posix() for path in folder.rglob("*.*") if path.is_file()}
-    assert set(shown) == {name for name in kept if name.endswith((".py", ".toml"))}
-    assert all(block == (folder / name).read_text() for name, block in shown.items())
+def test_the_page_shows_lines_of_the_example_and_links_each_of_its_files():
+    files = [path for path in EXAMPLE.rglob("*.*") if path.suffix in (".py", ".toml")]
+    whole = "".join(path.read_text() for path in files)
+    shown = [block for _, title, block in BLOCKS if title == "entry"]
+    assert len(shown) == 2 and all(block in whole for block in shown)
+    page = (FOLDER / "extension.md").read_text()
+    names = [path.relative_to(ROOT).as_posix() for path in files]
+    assert len(names) == 5 and all(f"](../../{name})" in page for name in names)
 
 
 def test_the_package_adds_an_effect_a_spectrum_and_a_command(package):
-    said = {line: package(line) for line in lines() if "pip install" not in line}
+    said = {line: package(line) for line in lines() if line.startswith(".venv/bin/lowalt")}
     brought = "mist (package lowalt-mist): commands mist; effects mist; spectra power"
     assert brought in said[".venv/bin/lowalt --help"]
     # 0.4 dB/km over 500 m are 0.2 dB.

@@ -12,6 +12,7 @@ from scipy import stats
 from builtin_records import CONFIG, TABLE
 from lowalt.config.classes import AIRBORNE
 from lowalt.motion.drawing import draw, region_polygon
+from lowalt.motion.poses import poses
 from lowalt.motion.table import NUMBERS, SCALE
 from lowalt.numerics.streams import stream
 from lowalt.targets.cloud import extent
@@ -153,3 +154,23 @@ def test_each_quantity_is_drawn_independently_of_the_others_and_of_other_models(
     for name, ranks in ranked.items():
         assert abs(np.corrcoef(ranks[1:], ranks[:-1])[0, 1]) < bound, name
         assert len(np.unique(ranks)) == ROWS, name
+
+
+@pytest.mark.parametrize("category", NAMES)
+def test_a_larger_yaw_turns_all_parts_to_the_left_about_the_origin(category):
+    cloud, ranges = cloud_of_class(category)
+    corners = region_polygon(MAST, SQUARE)
+    row = draw(stream(4, "motion", category), cloud, ranges, MAST, corners, MOTION)
+    row["model"] = 0
+    row["vx_mps"] = row["vy_mps"] = 0.0
+    turned = row | {"yaw_rad": row["yaw_rad"] + 0.8}
+    times_s = np.linspace(0.0, 0.1, 5)
+    before = poses(cloud, row, times_s)
+    after = poses(cloud, turned, times_s)
+    left = np.array(
+        [[math.cos(0.8), -math.sin(0.8), 0], [math.sin(0.8), math.cos(0.8), 0], [0, 0, 1]]
+    )
+    origin = np.array([row["x_m"], row["y_m"], 0.0])
+    expected = (before.translation - origin) @ left.T + origin
+    np.testing.assert_allclose(after.rotation, left @ before.rotation, atol=1e-12)
+    np.testing.assert_allclose(after.translation, expected, atol=1e-10)

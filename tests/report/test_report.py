@@ -79,21 +79,25 @@ def test_every_section_has_a_template_and_every_template_a_section():
     assert names | {"__init__"} == {path.stem for path in (TEMPLATES / "sections").glob("*.py")}
 
 
-def test_the_first_words_are_the_best_scheme_beside_the_paper_s_and_what_one_seed_says():
+def test_the_first_words_are_the_best_schemes_beside_the_paper_s_and_once_what_one_seed_says():
     rows = [
         {
-            "protocol": "unseen",
+            "protocol": protocol,
             "scheme": name,
             "snr_db": "avg",
             "accuracy_percent": value,
             "seeds": "1",
         }
+        for protocol in ("seen", "unseen")
         for name, value in (("A", "80.0"), ("ABC", "92.5"))
     ]
     published = [
         {"protocol": "unseen", "scheme": "ABC", "snr_db": "avg", "accuracy_percent": "97.8"}
     ]
-    (told,) = overview.accuracies(rows, published, 4)
-    assert (told["scheme"], told["percent"], told["paper"]) == ("ABC", 92.5, 97.8)
-    assert told["words"].startswith("Chance level is 25 %. The paper reports 97.8 %")
-    assert overview.verdict(None, 2, 3) == "Chance level is 50 %."
+    seen, unseen = overview.accuracies(rows, published)
+    assert (unseen["scheme"], unseen["percent"], unseen["paper"]) == ("ABC", 92.5, 97.8)
+    assert seen["paper"] is None
+    words = overview.verdict([seen, unseen], 4)
+    assert words.startswith("Chance level is 25 %. The paper's data are not public")
+    assert words.count("One training seed") == 1
+    assert overview.verdict([seen | {"seeds": 3}], 2) == "Chance level is 50 %."

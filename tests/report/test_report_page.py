@@ -2,7 +2,6 @@
 and can be kept.
 """
 
-import json
 import re
 from types import SimpleNamespace
 
@@ -10,8 +9,9 @@ import pytest
 
 from lowalt.report.inputs import FILES, KEPT, Inputs
 from lowalt.report.page import PARTS, assembled, rendered
+from lowalt.report.plots import Plot, plotted
 from lowalt.report.sections import recognition_cost, simulation_cost
-from pages import browsed, sound
+from pages import browsed, narrow, sound
 
 ROWS = (
     ("b", "10.5"),
@@ -114,28 +114,18 @@ def test_a_table_below_ten_rows_sorts_and_scrolls_but_has_neither_filter_nor_dow
     assert re.search('data-said="(.*?)"', found)[1] == "a, &quot;x&quot;;1;0"
 
 
-def test_the_first_tiles_fill_a_telephone_and_the_sample_scrolls_within_its_figure(tmp_path):
+def test_a_telephone_shows_whole_tiles_plots_and_navigation(tmp_path):
     tile = '<figure><div class="tile"><div class="down"><span>A</span></div><img alt="a" src="data:,"></div></figure>'
-    sample = (
-        '<div class="viewer"><figure><svg id="viewer-tile" viewBox="0 0 4 3"></svg></figure></div>'
-    )
-    inner = assembled(
-        "t",
-        [{"id": "one", "title": "One", "html": f'<div class="row tiles">{4 * tile}</div>{sample}'}],
-    )
+    picture = '<svg width="{0}" height="9" viewBox="0 0 {0} 9"></svg>'
+    plot = Plot("p", "plot", picture.format(900), [], picture.format(353))
+    html = f'<div class="row tiles">{4 * tile}</div>{plotted(plot)}'
+    parts = [{"id": part.id, "title": part.title, "html": html} for part in PARTS]
     script = """
-    const frame = document.createElement("iframe");
-    frame.style.width = "390px"; frame.style.height = "3000px";
-    frame.srcdoc = INNER;
-    frame.onload = () => {
-      const page = frame.contentDocument, figure = page.querySelector(".viewer figure");
-      const wide = page.querySelector(".tile img").getBoundingClientRect().width;
-      const seen = [page.documentElement.scrollWidth <= 390, figure.scrollWidth > figure.clientWidth, wide >= 160];
-      document.body.dataset.said = seen.join(";");
-    };
-    document.body.append(frame);
-    """.replace("INNER", json.dumps(inner).replace("</", "<\\/"))
-    found = browsed(
-        tmp_path, assembled("outer", [{"id": "two", "title": "Two", "html": "<p>x</p>"}]), script
-    )
-    assert re.search('data-said="(.*?)"', found)[1] == "true;true;true"
+    const page = frame.contentDocument, box = (node) => node.getBoundingClientRect();
+    const rights = [...page.querySelectorAll("nav a")].map((link) => box(link).right);
+    const widths = [...page.querySelectorAll(".plot svg")].map((svg) => box(svg).width).filter(Boolean);
+    document.body.dataset.said = [page.documentElement.scrollWidth <= 390, box(page.querySelector(".tile img")).width >= 160,
+      Math.max(...rights) <= 390, new Set(widths).size, widths[0]].join(";");
+    """
+    found = narrow(tmp_path, assembled("t", parts), script)
+    assert re.search('data-said="(.*?)"', found)[1] == "true;true;true;1;353"

@@ -4,25 +4,28 @@ a browser.
 
 import base64
 import html
+import io
 import json
 import re
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from chain import SPECTRA, WAVE
 from craft import craft, row
 from dataset import build
+from lowalt.config.classes import CATEGORIES
+from lowalt.config.network import Network
 from lowalt.motion import positions
 from lowalt.recognition.distances import cycle_s, still_row
-from lowalt.report import viewer, viewer_echoes
-from lowalt.report.figures.style import embedded
+from lowalt.report import viewer, viewer_echoes, viewer_truth
 from lowalt.report.page import assembled, rendered
+from lowalt.report.sections import sample_viewer
 from lowalt.shards import ShardSet
-from lowalt.shards.sample_record import sample_key
-from lowalt.tiles.png import encode
-from pages import browsed, sound
+from lowalt.shards.sample_record import record, sample_key
+from pages import browsed, narrow, sound
 
 STATIONS = {
     "A": {"position_m": [0, 0, 25], "normal_deg": 0},
@@ -65,7 +68,7 @@ def test_each_class_has_a_seen_and_an_unseen_subtype_and_predicted_samples_go_fi
 def test_points_of_the_motion_are_those_of_the_target_in_order():
     cloud = craft()
     moving = row(0)
-    found = viewer.motion(cloud, moving)
+    found = viewer.motion(cloud, moving, Network.from_settings(NETWORK))
     kept = np.frombuffer(base64.b64decode(found["points"]), "<i2").reshape(
         viewer.FRAMES, found["count"], 3
     )
@@ -75,7 +78,48 @@ def test_points_of_the_motion_are_those_of_the_target_in_order():
     assert found["count"] == len(cloud.points) <= viewer.POINTS
     wanted = wanted - (wanted.min(axis=(0, 1)) + wanted.max(axis=(0, 1))) / 2
     assert abs(kept / 32767 * found["scale_m"] - wanted).max() <= found["scale_m"] / 32767
-    assert found["part"] == cloud.part.tolist()
+    # A body is grey, and each of its points has the colour of its part.
+    assert found["colours"][:10] == ["#8a8f98"] * 10
+    assert len(set(found["colours"][10:])) == 1 and found["colours"][10] != "#8a8f98"
+
+
+def test_the_truth_of_a_still_target_is_one_line_at_its_folded_speed():
+    network = Network.from_settings(NETWORK)
+    station = network.stations[0]
+    largest = network.largest_mps(station)
+    # Straight away from the station, half as fast again as its largest speed.
+    away = {"x_m": 300.0, "y_m": 0.0, "z_m": 25.0, "vx_mps": 1.5 * largest, "vy_mps": 0.0}
+    moving = row(0) | away | {"vz_mps": 0.0, "rate_hz": 0.0}
+    cloud = craft()
+    (picture, _) = viewer_truth.truth(cloud, moving, network, np.arange(10))
+    image = Image.open(io.BytesIO(base64.b64decode(picture.partition(",")[2])))
+    assert image.mode == "P" and image.info["transparency"] == 0
+    assert image.size == (viewer_truth.COLUMNS, viewer_truth.ROWS)
+    lines, columns = np.nonzero(np.asarray(image))
+    # Folded by twice the largest, so half the largest towards the station.
+    assert set(columns) == set(range(viewer_truth.COLUMNS))
+    assert abs((lines + 0.5) / viewer_truth.ROWS - 0.75).max() < 0.02
+
+
+def test_the_truth_of_a_rotor_spreads_as_far_as_its_tips_move():
+    network = Network.from_settings(NETWORK)
+    cloud = craft()
+    moving = row(0)
+    times_s = np.linspace(0, 1 / moving["rate_hz"], 400)
+    station = network.stations[1]
+    speeds = viewer_truth.speeds_mps(cloud, moving, station, times_s)
+    ranges = viewer_truth.ranges_m(positions(cloud, moving, times_s), station)
+    # The slope of the range, by differences over the cycle's four hundredth.
+    slopes = np.gradient(ranges, times_s, axis=0)
+    assert abs(speeds - slopes)[1:-1].max() < 2e-3 * abs(speeds).max()
+    assert np.ptp(speeds[:, :10]) < 1 < np.ptp(speeds[:, 10:])
+
+
+def test_a_link_s_range_is_the_mean_over_its_ends():
+    sender = SimpleNamespace(position_m=(0.0, 0.0, 0.0), transmitter=None)
+    link = SimpleNamespace(position_m=(10.0, 0.0, 0.0), transmitter=sender)
+    assert viewer_truth.ranges_m(np.array([4.0, 0.0, 0.0]), sender) == 4
+    assert viewer_truth.ranges_m(np.array([4.0, 0.0, 0.0]), link) == (4 + 6) / 2
 
 
 def test_probabilities_are_those_of_the_first_seed_of_each_scheme(tmp_path):
@@ -89,129 +133,160 @@ def test_probabilities_are_those_of_the_first_seed_of_each_scheme(tmp_path):
     }
 
 
-@pytest.fixture
-def page():
-    """A page of the viewer alone, with two subtypes whose tiles differ."""
-    renderer = viewer.Renderer.from_settings(
-        {"network": NETWORK, "spectra": SPECTRA, "images": IMAGES}
-    )
-    panels = viewer.panels(renderer)
+def sample(renderer, subtype, effect, snr_db, step, signals):
+    """A sample of a subtype whose tile differs with `step`."""
+    moving = row(1) | {"subtype": subtype}
+    found = record(moving, snr_db, "test", 1, renderer.network)
+    tile = np.arange(32 * 48, dtype=np.uint8).reshape(32, 48) * step
+    return viewer.ViewedSample(effect, json.loads(found), tile, signals)
+
+
+HOSTILE = "</script><script>document.body.dataset.ran = 1</script><img src=x onerror=ran()>"
+
+
+@pytest.fixture(scope="module")
+def renderer():
+    """The renderer of the samples below, of two stations."""
+    settings = {"network": NETWORK, "spectra": SPECTRA, "images": IMAGES}
+    return viewer.Renderer.from_settings(settings)
+
+
+@pytest.fixture(scope="module")
+def values(renderer):
+    """The viewer's values of three samples: one target with and without an effect, and another of
+    which the cloud is not known, with a name that is code."""
+    times = renderer.network.times_s
+    signals = np.stack([np.exp(2j * np.pi * 30 * times), 0 * times])
+    viewed = [
+        sample(renderer, "DJI Mini 2", viewer.WITHOUT, np.inf, 0, signals),
+        sample(renderer, "DJI Mini 2", "clutter", np.inf, 1, signals),
+        sample(renderer, HOSTILE, viewer.WITHOUT, 8.0, 1, None),
+    ]
+    shares = {viewed[0].record["key"]: {"unseen ABC:VRP+TRP+VT": [0.2, 0.8, 0.0, 0.0]}}
+    clouds = {"DJI Mini 2": craft()}
+    groups = {"DJI Mini 2": "seen"}
+    return viewer.shown(viewed, renderer, clouds, groups, CATEGORIES, shares, (16, 8))
+
+
+@pytest.fixture(scope="module")
+def page(values):
+    """A page of the viewer alone."""
+    html_of_viewer = rendered("sample_viewer", values)
+    return assembled("viewer", [{"id": "samples", "title": "Samples", "html": html_of_viewer}])
+
+
+def test_panels_have_the_axes_of_their_spectra_and_truth_those_of_the_look(values, renderer):
+    panels = values["panels"]
     assert [(panel["row"], panel["column"]) for panel in panels] == [
         (r, c) for r in range(2) for c in range(3)
     ]
     vt = panels[2]
     # Filters are matched at the lowest subcarrier, and echoes turn at the middle one.
-    assert vt["low"] == -vt["high"] == pytest.approx(-6.0, rel=2e-3) and set(vt["y"]) <= set(
-        np.arange(-6.0, 6.5, 0.5)
-    )
+    assert vt["low"] == -vt["high"] == pytest.approx(-6.0, rel=2e-3)
+    assert set(vt["y"]) <= set(np.arange(-6.0, 6.5, 0.5))
     # Fewer symbols than the signal has: a window of 4 of 24, 2.5 ms apart.
-    assert (vt["left"], vt["right"]) == pytest.approx((1.5 * 2.5e-3, 21.5 * 2.5e-3)) and max(
-        vt["x"]
-    ) <= vt["right"]
-    tile = [
-        embedded(
-            encode(
-                np.arange(32 * 48, dtype=np.uint8).reshape(32, 48) * step, renderer.images.palette
-            )
-        )
-        for step in (0, 1)
-    ]
-    network, times = renderer.network, renderer.network.times_s
-    signals = np.stack([np.exp(2j * np.pi * 30 * times), 0 * times])
-    speeds = {
-        network.stations[0].name: {"radial_mps": 17.0},
-        network.stations[1].name: {"radial_mps": None},
-    }
-    shared = {
-        "category": "UAV",
-        "group": "seen",
-        "snr": "no noise",
-        "network": tile[1],
-        "echoes": viewer_echoes.echoes(signals, speeds, network),
-    }
-    one = {
-        **shared,
-        "subtype": "One",
-        "model": 1,
-        "tile": tile[0],
-        "probabilities": {"seen A": [0.2, 0.8]},
-    }
-    two = {**shared, "subtype": "Two", "model": 5, "tile": tile[1], "probabilities": {}}
-    data = {
-        "samples": [one, two],
-        "motions": {"One 1": viewer.motion(craft(), row(0))},
-        "classes": ["UAV", "Bird"],
-        "stations": ["A", "B"],
-    }
-    values = {
-        "data": data,
-        "panels": panels,
-        "size": 16,
-        "shown": 16,
-        "rows": 2,
-        "columns": 3,
-        "pixels": 8,
-        "stations": ["A", "B"],
-        "floor_db": 40.0,
-        "look_s": 0.06,
-    }
-    text = assembled(
-        "viewer", [{"id": "samples", "title": "Samples", "html": rendered("sample_viewer", values)}]
-    )
-    sound(text)
-    return text, tile
+    assert (vt["left"], vt["right"]) == pytest.approx((1.5 * 2.5e-3, 21.5 * 2.5e-3))
+    assert max(vt["x"]) <= vt["right"]
+    truth = values["truths"][1]
+    assert (truth["left"], truth["right"]) == (0, pytest.approx(24 * 2.5e-3))
+    assert truth["high"] == -truth["low"]
+    assert truth["high"] == renderer.network.largest_mps(renderer.network.stations[1])
+    assert all(panel["timed"] for panel in [*panels, *values["truths"]])
 
 
-def test_every_control_of_the_viewer_works(page, tmp_path):
-    text, tiles = page
+def test_the_page_of_the_viewer_is_whole_and_holds_no_code_of_a_name(page):
+    sound(page)
+    assert HOSTILE not in page
+
+
+def told(found, name):
+    """What a page's script left in an attribute `data-{name}` of the body, read as JSON."""
+    return json.loads(html.unescape(re.search(f'data-{name}="(.*?)"', found, re.S)[1]))
+
+
+def test_every_control_of_the_viewer_works(page, values, renderer, tmp_path):
     script = """
-    const at = (name) => document.getElementById("viewer-" + name), said = [], ink = () => at("motion").toDataURL();
-    const tell = () => said.push([at("name").textContent,
-      document.querySelector("image").getAttribute("href").length, at("shares").textContent].join("|"));
-    tell();
+    const at = (name) => document.getElementById("viewer-" + name), said = {};
+    const ink = () => at("motion").toDataURL();
+    const shown = () => [...document.querySelectorAll(".station")].filter((node) => !node.hidden).length;
+    const tell = (name) => { said[name] = [at("name").textContent, document.querySelector("image.tile").getAttribute("href"),
+      at("shares").textContent, at("effect").parentElement.hidden, shown()]; };
+    const choose = (name, value) => { at(name).value = value; at(name).dispatchEvent(new Event("change")); };
+    const now = () => [...document.querySelectorAll(".now")].filter((line) => line.style.display !== "none").length;
+    tell("first");
+    const drawn = (kind) => [...document.querySelectorAll("path." + kind)].map((path) => path.getAttribute("d"));
+    said.power = drawn("power"); said.phase = drawn("phase"); said.speeds = at("speeds").textContent;
+    said.marks = [...document.querySelectorAll("path.speed")].map((path) => path.getAttribute("transform"));
+    said.truth = [...document.querySelectorAll("image.truth")].map((image) => image.getAttribute("href"));
     const before = ink();
     at("motion").dispatchEvent(new KeyboardEvent("keydown", { key: "ArrowLeft" }));
     const turned = ink();
-    at("frame").value = 7; at("frame").dispatchEvent(new Event("input"));
-    said.push(String(before !== turned), String(turned !== ink()), at("time").textContent);
-    at("play").click(); said.push(at("play").textContent); at("play").click(); said.push(at("play").textContent);
-    at("subtype").value = "Two"; at("subtype").dispatchEvent(new Event("change"));
-    tell();
-    const drawn = (kind) => [...document.querySelectorAll("path." + kind)].map((path) => path.getAttribute("d"));
-    const marks = [...document.querySelectorAll("path.speed")].map((path) => path.getAttribute("transform"));
-    document.body.dataset.echo = JSON.stringify([at("speeds").textContent, drawn("power"), drawn("phase"), marks]);
-    document.body.dataset.said = said.join(";");
+    said.start = now();
+    at("frame").value = 0.031; at("frame").dispatchEvent(new Event("input"));
+    said.moved = [before !== turned, turned !== ink(), at("time").textContent, now()];
+    said.step = Number(at("frame").step);
+    at("play").click(); said.play = [at("play").textContent]; at("play").click(); said.play.push(at("play").textContent);
+    choose("effect", "clutter"); tell("effect");
+    choose("station", "all"); tell("all");
+    choose("subtype", at("subtype").options[1].value); tell("hostile");
+    choose("subtype", "DJI Mini 2");
+    const light = ink();
+    document.documentElement.dataset.theme = "dark";
+    setTimeout(() => { said.themed = light !== ink(); document.body.dataset.said = JSON.stringify(said); });
     """
-    found = browsed(tmp_path, text, script)
-    said = re.search('data-said="(.*?)"', found, re.S)[1].split(";")
-    assert said[0].startswith(f"UAV: One (seen), motion model 1, no noise|{len(tiles[0])}|")
-    assert "seen A20.080.0Bird, wrong" in said[0]
-    assert said[1:3] == ["true", "true"] and said[4:6] == ["Pause", "Play"]
-    assert said[3].endswith("ms.") and "of a cycle of" in said[3]
+    found = browsed(tmp_path, page, script)
+    assert "data-ran" not in found
+    said = told(found, "said")
+    one, with_effect, other = values["data"]["samples"]
+    name = "UAV: DJI Mini 2 (seen), motion model 1, no noise"
+    percents = "answerunseen ABC:VRP+TRP+VT20.080.00.00.0Bird, wrong"
+    assert said["first"][:2] == [name, one["tile"]] and percents in said["first"][2]
+    assert said["first"][3:] == [False, 1]
+    assert said["effect"][:2] == [f"{name}, with clutter", with_effect["tile"]]
+    assert said["all"][4] == 2
     none = "No network was asked about this sample."
-    assert said[6] == f"UAV: Two (seen), motion model 5, no noise|{len(tiles[1])}|{none}"
-    spoken, power, phase, marks = json.loads(
-        html.unescape(re.search('data-echo="(.*?)"', found, re.S)[1])
-    )
-    network = viewer.Renderer.from_settings(
-        {"network": NETWORK, "spectra": SPECTRA, "images": IMAGES}
-    ).network
-    station = network.stations[0]
-    shown = network.folded_mps(17.0, station)
-    folds = round((17.0 - shown) / (2 * network.largest_mps(station)))
-    assert (
-        f"A 17 m/s (shown at {round(shown, 2)} m/s, folded {folds} time" in spoken
-        and "B" not in spoken
-    )
+    hostile = f"UAV: {HOSTILE}, motion model 1, 8 dB"
+    assert said["hostile"] == [hostile, other["tile"], none, True, 2]
+    # The red line stands in the truth and the echo of both stations, and in every spectrum whose
+    # axis has the instant.
+    assert said["start"] == 4 and said["moved"] == [True, True, "0.031 s", 10]
+    assert said["step"] == pytest.approx(1 / 80 / viewer.FRAMES)
+    assert said["play"] == ["Pause", "Play"] and said["themed"]
+    assert said["speeds"].endswith(" Played 120 times slower.")
+    assert said["truth"] == values["data"]["motions"]["DJI Mini 2 1"]["truth"]
+    check_echoes(said, one, renderer.network)
+
+
+def check_echoes(said, one, network):
+    """What the viewer draws of the echoes: a tone at station A and nothing at station B."""
+    speed = one["echoes"][0]
+    words = f"A {speed['range']} m and {speed['speed']} m/s (not folded)"
+    assert words in said["speeds"] and "B" not in said["speeds"]
     # The power of a line is flat at the top of its panel, that of a silent station at the bottom.
-    assert set(re.findall(r"[ML][\d.]+ ([\d.]+)", power[0])) == {"0.0"}
-    assert set(re.findall(r"[ML][\d.]+ ([\d.]+)", power[1])) == {"64.0"}
-    heights = [float(value) for value in re.findall(r"M[\d.]+ ([\d.]+)", phase[0])]
+    assert set(re.findall(r"[ML][\d.]+ ([\d.]+)", said["power"][0])) == {"0.0"}
+    assert set(re.findall(r"[ML][\d.]+ ([\d.]+)", said["power"][1])) == {"64.0"}
+    heights = [float(value) for value in re.findall(r"M[\d.]+ ([\d.]+)", said["phase"][0])]
     wanted = [150 - 64 * (30 * time % 1) for time in network.times_s]
     assert len(heights) == network.symbols
     assert all(min(abs(a - b), 64 - abs(a - b)) < 0.3 for a, b in zip(heights, wanted, strict=True))
-    # One mark in each of the first station's three spectra, at the height of the folded speed.
-    assert [mark is not None for mark in marks] == [True] * 3 + [False] * 3
+    # A mark in the truth and in each spectrum, at the height of the speed that is shown.
+    largest = network.largest_mps(network.stations[0])
+    height = float(re.search(r"translate\(0 ([\d.]+)\)", said["marks"][0])[1])
+    assert height == pytest.approx(150 * (largest - speed["shown"]) / (2 * largest), abs=0.06)
+    assert all(said["marks"])
+
+
+def test_the_viewer_fits_a_telephone_and_its_panels_stand_below_each_other(page, tmp_path):
+    script = """
+    const page = frame.contentDocument, box = (node) => node.getBoundingClientRect();
+    const panels = [...page.querySelectorAll("svg.panel")].map(box).filter((found) => found.width);
+    const shares = page.getElementById("viewer-shares");
+    document.body.dataset.said = JSON.stringify([page.documentElement.scrollWidth, panels.length,
+      Math.max(...panels.map((found) => found.right)), new Set(panels.map((found) => found.left)).size,
+      shares.scrollWidth - shares.clientWidth]);
+    """
+    wide, count, right, columns, hidden = told(narrow(tmp_path, page, script), "said")
+    assert wide <= 390 and count == 5 and right <= 390 and columns == 1 and hidden == 0
 
 
 def test_a_speed_is_shown_where_its_phase_repeats():
@@ -229,12 +304,15 @@ def test_a_speed_is_shown_where_its_phase_repeats():
     )
     assert turns[0] % 1 == pytest.approx(turns[1] % 1)
     entries = viewer_echoes.echoes(
-        np.ones((2, 4)), {"A": {"radial_mps": None}, "B": {"radial_mps": -3.2 * limit}}, network
+        np.ones((2, 4)),
+        {"A": {"radial_mps": None}, "B": {"radial_mps": -3.2 * limit, "range_m": 20.04}},
+        network,
     )
     assert (
         "speed" not in entries[0]
         and entries[1]["shown"] == round(0.8 * limit, 2)
         and entries[1]["folds"] == 2
+        and entries[1]["range"] == 20.0
     )
 
 
@@ -255,7 +333,10 @@ def test_the_clearest_sample_of_a_motion_model_stands_first_and_a_browser_can_re
     tmp_path,
 ):
     shards = ShardSet(build(tmp_path, "image") / "index.json")
-    found = viewer.samples(shards, None, {}, [], {}, 16)
+    numbers = viewer.chosen(shards, set(), set())
+    viewed = sample_viewer.viewed(shards, numbers, None)
+    sides = viewer.PIXELS, 16
+    found = viewer.shown(viewed, shards.renderer, {}, {}, shards.classes, {}, sides)["data"]
     levels = {}
     for sample in found["samples"]:
         levels.setdefault((sample["subtype"], sample["model"]), []).append(sample["snr"])

@@ -271,3 +271,11 @@ def test_wrong_cells_are_as_many_and_as_far_as_asked():
     off = (cell_error.choose(settings, right, cells, None, stream(1, "e")) - 3 + 8) % 16 - 8
     share = np.array([(off == step).mean() for step in range(-3, 4)])
     np.testing.assert_allclose(share, [0, 1 / 16, 1 / 16, 0.75, 1 / 16, 1 / 16, 0], atol=0.01)
+
+
+def test_wrong_cells_wrap_around_as_ranges_do():
+    first = np.zeros(20_000, np.int64)
+    settings = cell_error.DEFAULTS | {"probability": 1.0, "spread_cells": 2}
+    found = cell_error.choose(settings, first, np.zeros((20_000, 16)), None, stream(2, "e"))
+    share = np.bincount(found, minlength=16) / len(found)
+    np.testing.assert_allclose(share[[14, 15, 1, 2]], 0.25, atol=0.015)

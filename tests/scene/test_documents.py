@@ -1,6 +1,5 @@
-"""The code of the page on scenes runs as pasted, and shows the drone where it truly is."""
+"""The programs of the page on scenes run, and show the drone where it truly is."""
 
-import re
 from pathlib import Path
 
 import numpy as np
@@ -10,10 +9,9 @@ from lowalt.spectra.cube import TRUTH
 ROOT = Path(__file__).parents[2]
 
 
-def run(picture: str, folder: Path) -> dict:
-    """The names that the page's block leaves which saves `picture`, saved into a folder instead."""
-    blocks = re.findall(r"```python\n(.*?)```", (ROOT / "docs/scenes.md").read_text(), re.DOTALL)
-    (code,) = [block for block in blocks if f'"{picture}"' in block]
+def run(program: str, picture: str, folder: Path) -> dict:
+    """The names that a program leaves which saves `picture`, saved into a folder instead."""
+    code = (ROOT / "examples" / program).read_text()
     names: dict = {}
     exec(code.replace(f'"{picture}"', repr(str(folder / picture))), names)
     assert (folder / picture).is_file()
@@ -22,7 +20,7 @@ def run(picture: str, folder: Path) -> dict:
 
 def test_the_page_on_scenes_shows_a_drone_over_a_town(monkeypatch, tmp_path):
     monkeypatch.chdir(ROOT)
-    names = run("map.png", tmp_path)
+    names = run("range_doppler_map.py", "map.png", tmp_path)
     cube = names["cube"]
     settings = names["settings"]
     found = names["range_doppler"].definition(cube, settings)
@@ -35,7 +33,7 @@ def test_the_page_on_scenes_shows_a_drone_over_a_town(monkeypatch, tmp_path):
 
 def test_elements_as_links_show_the_drone_at_its_angle_and_range(monkeypatch, tmp_path):
     monkeypatch.chdir(ROOT)
-    names = run("angle.png", tmp_path)
+    names = run("range_angle_map.py", "angle.png", tmp_path)
     row, cell = np.unravel_index(names["power"].argmax(), names["power"].shape)
     truth = names["cubes"][0].truth.mean(0)
     # Half the width of a beam of eight elements is 1/8; the target stays within two cells in a

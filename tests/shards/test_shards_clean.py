@@ -4,6 +4,7 @@ stand for.
 
 import json
 import math
+import shutil
 import tarfile
 
 import numpy as np
@@ -14,10 +15,13 @@ from dataset import CONFIG, SEED, SNRS, build
 from lowalt.config.network import Network
 from lowalt.files.errors import InputError
 from lowalt.noise.awgn import noisy_signals
+from lowalt.numerics.streams import stream
+from lowalt.scene.effects.transmitter import slow_time
 from lowalt.shards import ShardSet, clean
 from lowalt.shards.__main__ import main
 from lowalt.shards.card import main as card
-from lowalt.shards.sample_record import npy
+from lowalt.shards.index import build as build_index
+from lowalt.shards.sample_record import npy, row_of
 from lowalt.shards.sample_table import map_samples
 from lowalt.shards.verify import faults
 from lowalt.shards.write import ChunkSamples, write_shard
@@ -103,6 +107,31 @@ def test_every_sample_is_the_one_of_the_signal_shards_under_the_same_number(reci
     assert (found.images(7, 64, ["B"]) == expected.images(7, 64, ["B"])).all()
     with pytest.raises(InputError, match="kind 'recipe', expected 'image'"):
         found.png(0)
+
+
+def test_images_know_how_late_symbols_are_as_the_effect_draws_it(recipes, tmp_path):
+    """`spectra.times: known` takes each symbol at its instant, which the effect draws again."""
+    shutil.copytree(recipes, tmp_path / "late")
+    path = tmp_path / "late/index.json"
+    jitter = slow_time.DEFAULTS | {"downlink": 1.0, "jitter_s": 2e-3}
+    render = {name: CONFIG[name] for name in ("network", "spectra", "images")}
+    render["spectra"] = render["spectra"] | {"times": "known"}
+    effects = {"tolerance": None, "effects": {"slow_time": jitter}}
+    build_index(sorted(path.parent.glob("*.tar")), render, path, effects)
+    shards = ShardSet(path)
+    network = Network.from_settings(NETWORK)
+    row = row_of(shards.record(5))[0]
+    late = []
+    for name in STATIONS:
+        rng = stream(SEED, "effect", "slow_time", row["subtype"], row["model"], name)
+        times_s = slow_time.sampling(jitter, network, rng).times_s
+        late.append((times_s - network.times_s) / network.symbol_interval_s)
+    expected = shards.renderer.tile(shards.signal(5), late=np.stack(late))
+    assert (shards.tile(5) == expected).all()
+    assert (
+        shards.images(5) == expected.reshape(3, 256, 3, 256).swapaxes(1, 2).reshape(9, 256, 256)
+    ).all()
+    assert (shards.tile(5) != shards.renderer.tile(shards.signal(5))).any()
 
 
 def test_each_motion_model_is_stored_once(recipes, noised):

@@ -2,6 +2,7 @@
 of it.
 """
 
+import json
 import re
 import shutil
 import subprocess
@@ -121,14 +122,35 @@ def browsed(folder: Path, text: str, script: str = "") -> str:
         "--headless",
         "--no-sandbox",
         "--disable-gpu",
+        "--disable-background-networking",
+        "--disable-component-update",
+        "--no-first-run",
+        # There is no network: a page that asks for anything shows an error.
+        "--host-resolver-rules=MAP * ~NOTFOUND",
+        "--window-size=1280,900",
         "--enable-logging=stderr",
         f"--user-data-dir={folder}/user",
     ]
     # Virtual time that is idle passes at once. Plots are drawn only when they come into view, on a
     # busy machine late.
     command = [browser, *flags, "--virtual-time-budget=20000", "--dump-dom", path.as_uri()]
-    ran = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    ran = subprocess.run(command, capture_output=True, text=True, timeout=300)
     assert ran.returncode == 0, ran.stderr
     wrong = [line for line in ran.stderr.splitlines() if "CONSOLE" in line]
     assert not wrong
     return ran.stdout
+
+
+def narrow(folder: Path, text: str, script: str) -> str:
+    """Return `browsed` of an empty page that holds the page `text` in a frame as wide as a
+    telephone; `script` runs when it is loaded and knows it as `frame`.
+    """
+    inner = json.dumps(text).replace("</", "<\\/")
+    outer = """
+    const frame = document.createElement("iframe");
+    frame.style.width = "390px"; frame.style.height = "3000px"; frame.style.border = "0";
+    frame.srcdoc = INNER;
+    frame.onload = () => { SCRIPT };
+    document.body.append(frame);
+    """.replace("SCRIPT", script).replace("INNER", inner)
+    return browsed(folder, "<body></body>", outer)

@@ -3,12 +3,13 @@ of the cubes.
 """
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from lowalt.config.network import Network
+from lowalt.config.network import SPEED_OF_LIGHT, Network
 from lowalt.spectra import Fourier, spectrum
 from lowalt.spectra.cube import TRUTH
 from lowalt.spectra.kinds import range_doppler
@@ -70,6 +71,29 @@ def test_one_speed_axis_reads_a_sweep_of_speeds_in_maps_and_spectra(symbols):
             assert (
                 abs(network.folded_mps(seen_mps - shown_mps, station)) <= TIE * (first - last) / 63
             )
+
+
+@pytest.mark.parametrize("shape", [(8, 8), (1, 1)])
+def test_the_observed_speed_is_the_rate_of_the_echo_s_phase_to_a_tenth_of_a_millimetre(shape):
+    """A point close by moves across the face, so that the arrays' middles change the rate by 2 cm/s."""
+    config = observed_truth.block_of(ROOT, "paper")
+    network = Network.from_settings(config["network"] | {"symbols": 33})
+    network = replace(network, transmit=shape, receive=shape)
+    cubes = Cubes(observed_truth.Scene(network, 1, None, ()), {"Point": observed_truth.point()})
+    for station in network.stations:
+        away = np.array([np.cos(station.normal_rad), np.sin(station.normal_rad), 0.0])
+        aside = np.array([-away[1], away[0], 0.0])
+        position_m = station.position_m + 60 * away + 10 * aside
+        row = observed_truth.course(network, "across", 0) | {"model": 0}
+        row |= dict(zip(("x_m", "y_m", "z_m"), position_m, strict=True))
+        row |= dict(zip(("vx_mps", "vy_mps", "vz_mps"), 12 * aside, strict=True))
+        cube = cubes.of(row, np.inf, station)
+        cell = int(cube.truth[16, TRUTH.index("cell")])
+        turns = np.unwrap(np.angle(cube.cells[:, cell])) / (2 * np.pi)
+        doppler_hz = np.gradient(turns, network.symbol_interval_s, edge_order=2)
+        wavelength_m = SPEED_OF_LIGHT / network.effective_hz(station)
+        speed_mps = network.folded_mps(-doppler_hz * wavelength_m / 2, station)
+        assert abs(speed_mps - cube.truth[:, TRUTH.index("observed_mps")]).max() < 1e-4
 
 
 def test_geometric_truth_stays_where_the_target_is_while_clocks_move_its_echo():

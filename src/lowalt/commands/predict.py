@@ -49,7 +49,8 @@ def run(options: argparse.Namespace) -> Answer:
     existing(options.input, "input")
     reader = _reader(options.input.suffix) if options.input.suffix in readers else None
     content = reader.read(options.input) if reader else None
-    config = overlaid(options.overlay) if options.overlay else {}
+    # The backbone that an overlay of the user names is trusted, so that block counts here.
+    config = overlaid(options.overlay, unused=()) if options.overlay else {}
     # What can be refused without torch has been refused: it takes seconds to import.
     if sys.stderr.isatty():
         print("lowalt predict: loading the network", file=sys.stderr, flush=True)

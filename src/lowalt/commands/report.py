@@ -11,14 +11,13 @@ import yaml
 from lowalt.commands import workflow
 from lowalt.commands.command_line import Answer, add_command
 from lowalt.commands.compare import facts
+from lowalt.config.brought import refuse_brought, refuse_training
 from lowalt.config.layers import SCHEMA, check, of_run
 from lowalt.config.named_code import allowed
 from lowalt.files.atomic import write_file
-from lowalt.files.csv_tables import read_csv
 from lowalt.files.errors import InputError
-from lowalt.files.shipped import as_named, located, shipped
+from lowalt.files.shipped import as_named, shipped
 from lowalt.files.yaml_files import load_yaml
-from lowalt.scene.trust import refuse_effects
 
 BASE = "config/default.yaml"
 
@@ -85,19 +84,16 @@ def page(options: argparse.Namespace) -> Answer:
 
 
 def _refuse_code(config: dict, folder: Path) -> None:
-    """Refuse a run whose configuration, or whose table of schemes, names code that the workflow
-    would run.
+    """Refuse a run whose configuration, or whose table of schemes, names code, weights or files
+    elsewhere, which the workflow would use.
     """
-    refuse_effects(check(config, shipped(SCHEMA))["effects"], folder)
-    block = located(config)["recognition"]
+    check(config, shipped(SCHEMA))
     how = (
         f"an overlay of your own that names it: `lowalt run OVERLAY --target {folder}/report.html`"
     )
-    for name in (
-        block["network"]["backbone"],
-        *(row["backbone"] for row in read_csv(block["table"], "backbone")),
-    ):
-        allowed(name, "", folder, how)
+    allowed(config["recognition"]["network"]["backbone"], "", folder, how)
+    refuse_brought(config, folder / "config.yaml")
+    refuse_training(config, folder, how)
 
 
 def gallery(results: Path) -> Answer:

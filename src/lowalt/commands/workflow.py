@@ -13,9 +13,9 @@ from pathlib import Path
 
 from lowalt.commands.command_line import Answer, add_command
 from lowalt.config.command import exit_status
+from lowalt.config.layers import read_layer
 from lowalt.files.errors import InputError
 from lowalt.files.shipped import SHIPPED, shipped
-from lowalt.files.yaml_files import load_yaml
 from lowalt.workflow import status
 from lowalt.workflow.status import PLANNED_JOBS
 
@@ -55,8 +55,8 @@ def add_to(commands: argparse._SubParsersAction, name: str) -> None:
 def command(options: argparse.Namespace) -> list[str]:
     """Return the command line of Snakemake.
 
-    Raises: InputError naming an overlay that is missing or no YAML mapping, wrong cores, a profile
-    that is not there, or where there is no Snakefile.
+    Raises: InputError naming an overlay that is missing, no YAML mapping, or of a run and names
+    code, wrong cores, a profile that is not there, or where there is no Snakefile.
     """
     if not SNAKEFILE.is_file():
         raise InputError(
@@ -68,7 +68,7 @@ def command(options: argparse.Namespace) -> list[str]:
             raise InputError(
                 f"configuration: no file at {path} (a rule or file to make is named by --target)"
             )
-        load_yaml(path)
+        read_layer(path, trains=True)
     base = [] if Path("config/default.yaml").is_file() else [SHIPPED / "config/default.yaml"]
     if options.cores not in (None, "all") and not (
         options.cores.isdecimal() and int(options.cores)

@@ -14,8 +14,9 @@ in its key `like`. The key is needed for a user's own class only.
 
 import re
 from collections.abc import Iterable, Mapping
+from pathlib import Path
 
-from lowalt.files.errors import InputError
+from lowalt.files.errors import InputError, shown
 
 CATEGORIES = ("UAV", "Bird", "Vehicle", "Pedestrian")
 """The published classes in their label order, and what a target can be like."""
@@ -24,7 +25,19 @@ AIRBORNE = ("UAV", "Bird")
 """Categories that fly; the other two stay on the ground."""
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9 ()_-]{0,39}")
+_SUBTYPE = re.compile(r"[^\W_][\w .,:+()/&'#-]{0,79}")
 _PLURALS = {"UAV": "UAVs", "Bird": "birds", "Vehicle": "vehicles", "Pedestrian": "pedestrians"}
+
+
+def refuse_subtype(name: object, where: str | Path) -> None:
+    """Refuse a name of a subtype that a page, a table calculation or a terminal would take for more
+    than a name. Raises: InputError naming `where`.
+    """
+    if not isinstance(name, str) or not _SUBTYPE.fullmatch(name):
+        raise InputError(
+            f"{where}: the subtype's name is {shown(name)}, expected a letter or digit, then at most "
+            "79 letters, digits, spaces or _.,:+()/&'#-"
+        )
 
 
 def classes_of(table: Mapping[str, dict]) -> tuple[str, ...]:

@@ -18,7 +18,13 @@ from pathlib import Path
 from typing import Any
 
 from lowalt.files.atomic import text_of
-from lowalt.files.errors import InputError, InputWarning, lacking, shortened
+from lowalt.files.errors import (
+    InputError,
+    InputWarning,
+    in_plain_characters,
+    lacking,
+    shortened,
+)
 from lowalt.files.json_objects import json_object
 from lowalt.machine.memory import keep_freed_memory
 
@@ -125,9 +131,11 @@ def refusal(error: InputError | OSError | ImportError) -> str:
         return str(lacking(error))
     if error.errno not in REFUSED or error.filename is None:
         raise error
-    return shortened(
-        f"{error.filename}: {error.strerror}, expected a file or folder that this user may read or write"
+    refused = (
+        f"{error.filename}: {error.strerror}, expected a file or folder that this user may read or "
+        "write"
     )
+    return shortened(in_plain_characters(refused))
 
 
 @contextlib.contextmanager
@@ -169,7 +177,13 @@ USUAL_FORMAT = warnings.formatwarning
 
 
 def warn_in_one_line() -> None:
-    """Print each InputWarning as one line without its place in the source."""
+    """Print each InputWarning as one line without its place in the source, and no warning of a
+    library unless `python -W` or PYTHONWARNINGS asks for warnings.
+    """
+    if not sys.warnoptions:
+        # What a library finds odd in a file stands in front of the sentence that says it.
+        warnings.simplefilter("ignore")
+        warnings.simplefilter("default", InputWarning)
     warnings.formatwarning = lambda message, category, *place, **more: (
         f"warning: {message}\n"
         if issubclass(category, InputWarning)

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import yaml
 
+from lowalt.config.brought import OF_TRAINING, is_of_run, refuse_brought, refuse_training
 from lowalt.config.command import parser, run
 from lowalt.config.network import OFDM
 from lowalt.config.schema import check_brought, faults, plain, with_extensions, with_numbers
@@ -141,11 +142,38 @@ def check(config: dict, schema_path: str | Path) -> dict:
     return config
 
 
-def load(layers: Iterable[str | Path | dict], schema_path: str | Path) -> dict:
+def read_layer(path: str | Path, unused: Iterable[str] = (), trains: bool = False) -> dict:
+    """Return what a configuration file holds, which may be an overlay of the user or of a run.
+
+    unused: blocks that the caller does not use; what they name is not refused. trains: whether the
+    caller trains networks.
+    Raises: InputError naming the file where it is no YAML, or where it counts as a run's
+    (`brought.is_of_run`) and names code, weights or files elsewhere.
+    """
+    content = load_yaml(path)
+    used = {key: value for key, value in content.items() if key not in unused}
+    try:
+        refuse_brought(used, path)
+        if trains:
+            refuse_training(content, path)
+    except InputError:
+        # The schema takes longer to read than most overlays, so it is asked last.
+        if is_of_run(Path(path), content, load_yaml(shipped(SCHEMA))["required"]):
+            raise
+    return content
+
+
+def load(
+    layers: Iterable[str | Path | dict],
+    schema_path: str | Path,
+    unused: Iterable[str] = OF_TRAINING,
+) -> dict:
     """Return the checked configuration of a base file and its overlays, in order, each a path or a
     dict.
 
-    A file that is not in the working directory is taken from the package.
+    A file that is not in the working directory is taken from the package. unused: as in
+    `read_layer`, by default the blocks that making samples does not use. The embedded default
+    belongs to the checkout and is trusted.
     Raises: InputError naming file, key and value.
 
         >>> paths = ["config/default.yaml", "config/tiny.yaml"]
@@ -155,14 +183,20 @@ def load(layers: Iterable[str | Path | dict], schema_path: str | Path) -> dict:
     """
     result: dict = {}
     for layer in layers:
-        result = merge(result, layer if isinstance(layer, dict) else load_yaml(shipped(layer)))
+        if isinstance(layer, dict):
+            content = layer
+        elif layer == DEFAULT:
+            content = load_yaml(shipped(layer))
+        else:
+            content = read_layer(shipped(layer), unused)
+        result = merge(result, content)
     return located(check(result, shipped(schema_path)))
 
 
 def of_run(folder: str | Path) -> dict:
     """Return the configuration in a run's folder, plain values only; it may be of an older schema.
 
-    The folder is untrusted, so nothing in it may choose code (`named_code.allowed`).
+    The folder is untrusted, so whoever opens what it names asks `brought.refuse_brought` first.
     Raises: InputError naming a folder that is not a run's, or the file and the wrong key.
     """
     path = Path(folder) / "config.yaml"
@@ -173,9 +207,9 @@ def of_run(folder: str | Path) -> dict:
     return config
 
 
-def overlaid(overlays: Iterable[str | Path | dict]) -> dict:
+def overlaid(overlays: Iterable[str | Path | dict], unused: Iterable[str] = OF_TRAINING) -> dict:
     """Return the embedded default with overlays laid over it, in order, as `load` does."""
-    return load([DEFAULT, *overlays], SCHEMA)
+    return load([DEFAULT, *overlays], SCHEMA, unused)
 
 
 def main(arguments: list[str]) -> None:

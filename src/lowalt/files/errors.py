@@ -34,6 +34,18 @@ def shortened(text: str, longest: int = LONGEST) -> str:
     return text if len(text) <= longest else f"{text[:start]} ... {text[start + 5 - longest :]}"
 
 
+def in_plain_characters(text: str) -> str:
+    """Return a text whose control characters, and others that a terminal obeys instead of showing,
+    are written as escapes such as \\x1b; line ends and tabs stay.
+    """
+    if text.isprintable():
+        return text
+    return "".join(
+        sign if sign.isprintable() or sign in "\n\t" else sign.encode("unicode_escape").decode()
+        for sign in text
+    )
+
+
 def shown(value: object) -> str:
     """Return a value of a file as text of at most 200 characters."""
     try:
@@ -47,12 +59,12 @@ class InputError(ValueError):
     """Bad input from outside; the message names the file, key or value and what was expected
     instead.
 
-    It has at most LONGEST characters.
+    It has at most LONGEST characters, and no control character of a file reaches the terminal.
     """
 
     def __init__(self, message: str) -> None:
         """Take the message; its middle is cut out if it is too long."""
-        super().__init__(shortened(message))
+        super().__init__(shortened(in_plain_characters(shortened(message))))
 
 
 class BelowFloor(InputError):
@@ -139,4 +151,4 @@ def warn(text: str) -> None:
     ):
         level = level + 1
         frame = frame.f_back
-    warnings.warn(text, InputWarning, stacklevel=level)
+    warnings.warn(in_plain_characters(text), InputWarning, stacklevel=level)

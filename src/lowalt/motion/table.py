@@ -5,6 +5,7 @@ import math
 from collections.abc import Collection
 from pathlib import Path
 
+from lowalt.config.classes import refuse_subtype
 from lowalt.files.atomic import text_file
 from lowalt.files.csv_tables import write_csv
 from lowalt.files.errors import InputError
@@ -94,6 +95,7 @@ def _row(path: str | Path, line: int, header: tuple[str, ...], cells: list[str])
     if len(cells) != len(header):
         raise InputError(f"{path}, line {line}: {len(cells)} cells, expected {len(header)}")
     row: dict = dict(zip(header, cells, strict=True))
+    refuse_subtype(row["subtype"], f"{path}, line {line}")
     for name in header[len(TEXTS) :]:
         text = row[name]
         try:

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from lowalt.config.brought import refuse_brought, refuse_weights
 from lowalt.config.layers import SCHEMA, check, of_run
 from lowalt.config.named_code import allowed
 from lowalt.config.network import station_names
@@ -20,6 +21,8 @@ from lowalt.recognition.schemes import named
 from lowalt.recognition.score import scores
 from lowalt.shards import ShardSet
 
+BY_ARGUMENT = "none, or the argument `weights` with a file that you trust or 'hub'"
+
 
 def train(
     run: str | Path,
@@ -28,6 +31,7 @@ def train(
     seed: int = 0,
     out: str | Path = "model",
     backbone: str = "",
+    weights: str = "",
     **training: object,
 ) -> runs.Trained:
     """Train a scheme on the data set of a finished run and return the model, which stays in
@@ -35,16 +39,21 @@ def train(
 
     run: its folder, such as results/default; scheme: a name of config/schemes.csv; protocol:
     "unseen" trains on twenty subtypes and tests on the others, "seen" trains and tests on other
-    motion of all; backbone: FILE.py:FUNCTION of your own, which a run's folder may not choose;
-    training: settings that replace the run's own, such as steps=500. A training that was
-    interrupted goes on.
-    Raises: InputError for a run that is not finished or names code, or a wrong name or setting.
+    motion of all; backbone: FILE.py:FUNCTION of your own, weights: hub or a file of your own to
+    begin with, which a run's folder may not choose; training: settings that replace the run's own,
+    such as steps=500. A training that was interrupted goes on.
+    Raises: InputError for a run that is not finished, or names code, weights or files elsewhere, or
+    a wrong name or setting.
     """
     config, index = _opened(run)
     block = config["recognition"]
+    refuse_brought({"recognition": {"table": block["table"]}}, Path(run) / "config.yaml")
+    if not weights:
+        weights = block["network"]["weights"]
+        refuse_weights(weights, run, BY_ARGUMENT)
     chosen = named(block["table"], scheme, station_names(config["network"]))
     name = backbone or allowed(chosen.backbone_of(block["network"]), "", run)
-    network = {**block["network"], "backbone": name}
+    network = {**block["network"], "backbone": name, "weights": weights}
     settings = chosen.settled(
         {
             "size": block["size"],

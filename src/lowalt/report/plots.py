@@ -1,7 +1,7 @@
 """Plots of the page: a figure as SVG, in the page and as a file, and its data as CSV."""
 
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import NamedTuple
 
@@ -12,14 +12,20 @@ from lowalt.files.atomic import write_file
 from lowalt.files.csv_tables import write_csv
 from lowalt.report.figures.style import svg
 
+NARROW_IN = 4.9
+"""Width of a figure for telephones, which show 358 pixels beside the page's margins, in inches."""
+
 
 class Plot(NamedTuple):
-    """Name of its files, description for screen readers, its SVG, and the rows of its table."""
+    """Name of its files, description for screen readers, its SVG, the rows of its table, and its
+    SVG for telephones, "" where it has none.
+    """
 
     name: str
     description: str
     svg: str
     rows: list[dict]
+    narrow_svg: str = ""
 
 
 def drawn(name: str, description: str, figure: Figure, rows: list[dict]) -> Plot:
@@ -28,10 +34,21 @@ def drawn(name: str, description: str, figure: Figure, rows: list[dict]) -> Plot
     return Plot(name, description, text, rows)
 
 
+def for_every_width(draw: Callable[..., Plot], *given) -> Plot:
+    """Return the plot `draw(*given)`, with the SVG of `draw(*given, narrow=True)` for telephones."""
+    plot = draw(*given)
+    narrow = draw(*given, narrow=True).svg
+    # Both stand in one page, where ids are unique.
+    return plot._replace(narrow_svg=narrow.replace(f"{plot.name}-", f"{plot.name}-narrow-"))
+
+
 def plotted(plot: Plot) -> Markup:
-    """Return the HTML of a plot."""
+    """Return the HTML of a plot, of which the page's style shows the picture that fits."""
+    pictures = Markup('<div class="wide">{}</div>').format(Markup(plot.svg))
+    if plot.narrow_svg:
+        pictures += Markup('<div class="narrow">{}</div>').format(Markup(plot.narrow_svg))
     return Markup('<figure class="plot"><div role="img" aria-label="{}">{}</div></figure>').format(
-        plot.description, Markup(plot.svg)
+        plot.description, pictures
     )
 
 

@@ -1,28 +1,31 @@
-"""The samples in the viewer of the page: their choice, tiles with axes, echoes, probabilities and
-motion.
+"""The samples in the viewer of a page: their choice, tiles with axes, echoes, probabilities, motion
+and truth.
 
-All are small: tiles are reduced to PIXELS a side, motion is kept as millimetres at FRAMES instants
-of one cycle.
+The viewer is one template with its script and its colours (`viewer.html`), which the report of a run
+and the site of documents share; `shown` returns all that the template needs. All is small: motion
+is kept at FRAMES instants of one cycle.
 """
 
 import base64
 import csv
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib.ticker import MaxNLocator
 
-from lowalt.files.atomic import slug, text_file
+from lowalt.config.network import Network
+from lowalt.files.atomic import text_file
 from lowalt.motion import positions
 from lowalt.recognition import predictions
 from lowalt.recognition.distances import cycle_s, still_row
 from lowalt.report.figures.style import embedded
 from lowalt.report.figures.tile_axes import axes_of
-from lowalt.report.viewer_echoes import echoes
+from lowalt.report.viewer_echoes import FLOOR_DB, echoes
+from lowalt.report.viewer_truth import colours, truth
 from lowalt.shards import ShardSet
-from lowalt.shards.remake import Remaker
 from lowalt.shards.sample_record import row_of
 from lowalt.spectra import spectrum
 from lowalt.targets.cloud import Cloud
@@ -31,6 +34,7 @@ from lowalt.tiles.png import encode
 from lowalt.tiles.render import Renderer, join, split
 
 PIXELS = 80
+"""Pixels per side of an image in the report of a run."""
 MODELS = 2
 """Number of motion models of a subtype."""
 SNRS = 3
@@ -40,6 +44,22 @@ BUDGET = 3_500_000
 FRAMES = 24
 POINTS = 160
 KEY = re.compile(r"(.+)-(\d{6,})-snr.+")
+TIME = "time (s)"
+WITHOUT = "none"
+"""Word for the absence of an effect."""
+
+
+class ViewedSample(NamedTuple):
+    """A sample of the viewer.
+
+    effect: what the scene adds, in one word; record: as in the shards; tile: (rows, columns) uint8
+    index values; signal: (stations, symbols) complex, None where it cannot be made again.
+    """
+
+    effect: str
+    record: dict
+    tile: np.ndarray
+    signal: np.ndarray | None
 
 
 def chosen(shards: ShardSet, predicted: set[str], unseen: set[str]) -> list[int]:
@@ -106,10 +126,11 @@ def probabilities(
     return of_samples
 
 
-def motion(cloud: Cloud, row: dict) -> dict:
-    """Return one cycle of a target's own motion for the page.
+def motion(cloud: Cloud, row: dict, network: Network) -> dict:
+    """Return one cycle of a target's own motion, and the truth of its motion in the look.
 
-    `points` are int16 in base64, of which 32767 is `scale_m`.
+    `points` are int16 in base64, of which 32767 is `scale_m`; `colours` of the points; `truth`: a
+    picture per station (`lowalt.report.viewer_truth`).
     """
     moves = len(cloud.track) or row["rate_hz"] > 0
     seconds = cycle_s(cloud, row) if moves else 1.0
@@ -119,14 +140,15 @@ def motion(cloud: Cloud, row: dict) -> dict:
     points = points - (points.min(axis=(0, 1)) + points.max(axis=(0, 1))) / 2
     scale = max(float(abs(points).max()), 1e-9)
     data = base64.b64encode((points / scale * 32767).round().astype("<i2").tobytes()).decode()
-    part = cloud.part[some].tolist() if len(cloud.part) == len(cloud.points) else [0] * len(some)
+    of_parts = ["#{:02x}{:02x}{:02x}".format(*colour) for colour in colours(cloud)]
     return {
         "seconds": seconds,
         "count": len(some),
         "frames": FRAMES,
         "scale_m": scale,
-        "part": part,
+        "colours": [of_parts[part] for part in cloud.part[some]],
         "points": data,
+        "truth": truth(cloud, row, network, some),
     }
 
 
@@ -136,33 +158,49 @@ def _ticks(low: float, high: float) -> list[float]:
     return [float(f"{value:g}") for value in values if low <= value <= high]
 
 
+def _panel(
+    station: str, title: str, across: tuple[str, float, float], upwards: tuple[str, float, float]
+) -> dict:
+    """A panel's title and axes: name, lowest and highest value of each, and ticks."""
+    _, left, right = across
+    _, first, last = upwards
+    low, high = sorted((first, last))
+    return {
+        "station": station,
+        "title": title,
+        "low": low,
+        "high": high,
+        "left": left,
+        "right": right,
+        "across": across[0],
+        "timed": across[0] == TIME,
+        "upwards": upwards[0].partition("\n")[0],
+        "x": _ticks(left, right),
+        "y": _ticks(low, high),
+    }
+
+
 def panels(renderer: Renderer) -> list[dict]:
     """Return what the images of a tile show, station by station: names, axes, ticks."""
     entries = []
     for row, station in enumerate(renderer.network.stations):
         for column, name in enumerate(renderer.spectra):
             axes = axes_of(name, station, renderer)
-            low, high = sorted(axes.upwards[1:])
-            (across, left, right), (upwards, first, last) = axes
-            folds = renderer.network.largest_mps(station)
-            entries.append(
-                {
-                    "row": row,
-                    "column": column,
-                    "station": station.name,
-                    "title": spectrum(name).TITLE,
-                    "low": low,
-                    "high": high,
-                    "left": left,
-                    "right": right,
-                    "across": across,
-                    "upwards": upwards.partition("\n")[0],
-                    "turned": first > last,
-                    "folds": folds,
-                    "x": _ticks(left, right),
-                    "y": _ticks(low, high),
-                }
-            )
+            _, first, last = axes.upwards
+            place = {"row": row, "column": column, "turned": first > last}
+            entries.append(place | _panel(station.name, spectrum(name).TITLE, *axes))
+    return entries
+
+
+def truth_panels(network: Network) -> list[dict]:
+    """Return the axes of each station's truth: the whole look, and speeds up to the largest."""
+    entries = []
+    for row, station in enumerate(network.stations):
+        folds = network.largest_mps(station)
+        across = TIME, 0.0, network.symbols * network.symbol_interval_s
+        upwards = "radial speed (m/s)", -folds, folds
+        place = {"row": row, "folds": folds}
+        entries.append(place | _panel(station.name, "truth", across, upwards))
     return entries
 
 
@@ -175,33 +213,54 @@ def reduced(tile: np.ndarray, spectra: int, pixels: int, palette: np.ndarray) ->
     return embedded(encode(join(images, spectra), palette))
 
 
-def samples(
-    shards: ShardSet,
-    remaker: Remaker | None,
-    clouds: dict[str, Cloud],
-    files: list[str],
-    groups: dict[str, str],
-    pixels: int,
+def _entry(
+    one: ViewedSample, network: Network, tiles: tuple[str, str], group: str, shares: dict
 ) -> dict:
-    """Return the viewer's samples: {"samples": [...], "motions": {...}}.
+    """The page's entry of a sample; tiles: its embedded pictures for readers and of the networks."""
+    record = one.record
+    heard = []
+    if one.signal is not None:
+        heard = echoes(one.signal, record["geometry"], network)
+    tile, of_networks = tiles
+    return {
+        "subtype": record["subtype"],
+        "category": record["category"],
+        "model": record["model"],
+        "group": group,
+        "effect": one.effect,
+        "snr": f"{record['snr_db']:g} dB" if record["noise"] else "no noise",
+        "tile": tile,
+        "network": of_networks,
+        "echoes": heard,
+        "probabilities": shares,
+    }
 
-    remaker: makes signals again, None for a data set that does not say how; clouds: by subtype;
-    files: prediction files; groups: "seen" or "unseen" by subtype; pixels: side of an image as the
-    networks see it.
+
+def shown(
+    viewed: Iterable[ViewedSample],
+    renderer: Renderer,
+    clouds: Mapping[str, Cloud],
+    groups: dict[str, str],
+    classes: tuple[str, ...],
+    shares: dict[str, dict],
+    sides: tuple[int, int],
+) -> dict:
+    """Return the values of the viewer's template.
+
+    viewed: the samples, the most important first, of which as many are taken as BUDGET allows;
+    clouds: by subtype; groups: "seen" or "unseen" by subtype; shares: as `probabilities` returns
+    them; sides: pixels per side of an image on the page, and of one as the networks see it.
     """
-    unseen = {slug(name) for name, group in groups.items() if group == "unseen"}
-    numbers = chosen(shards, predicted_keys(files), unseen)
-    keys = {shards.keys[number].decode() for number in numbers}
-    shares = probabilities(files, keys, shards.classes)
-    names = [station.name for station in shards.renderer.network.stations]
-    spectra = len(shards.spectra)
-    motions = {}
+    network = renderer.network
+    spectra = len(renderer.spectra)
+    palette = renderer.images.palette
+    side, network_side = sides
+    motions: dict[str, dict] = {}
     total = 0
     kept: list[tuple[float, dict]] = []
-    for number in numbers:
-        whole = shards.tile(number)
-        record = shards.record(number)
-        tile = reduced(whole, spectra, PIXELS, shards.palette)
+    for one in viewed:
+        record = one.record
+        tile = reduced(one.tile, spectra, side, palette)
         total += len(tile)
         if kept and total > BUDGET:
             break
@@ -209,27 +268,33 @@ def samples(
         name = f"{subtype} {record['model']}"
         moves = record["motion"].get("x_m") is not None
         if name not in motions and subtype in clouds and moves:
-            motions[name] = motion(clouds[subtype], row_of(record)[0])
-        heard = []
-        if remaker:
-            heard = echoes(remaker.signal(record), record["geometry"], remaker.network)
-        sample = {
-            "subtype": subtype,
-            "category": record["category"],
-            "model": record["model"],
-            "group": groups.get(subtype, ""),
-            "snr": f"{record['snr_db']:g} dB" if record["noise"] else "no noise",
-            "tile": tile,
-            "network": reduced(whole, spectra, pixels, shards.palette),
-            "echoes": heard,
-            "probabilities": shares.get(record["key"], {}),
-        }
-        kept.append((record["snr_db"], sample))
+            motions[name] = motion(clouds[subtype], row_of(record)[0], network)
+        tiles = tile, reduced(one.tile, spectra, network_side, palette)
+        shares_of_one = shares.get(record["key"], {})
+        entry = _entry(one, network, tiles, groups.get(subtype, ""), shares_of_one)
+        kept.append((record["snr_db"], entry))
     # The clearest sample of a motion model first, as the page lists them.
-    clearest = [sample for _, sample in sorted(kept, key=lambda pair: -pair[0])]
-    return {
+    clearest = [entry for _, entry in sorted(kept, key=lambda pair: -pair[0])]
+    stations = [station.name for station in network.stations]
+    look_s = network.symbols * network.symbol_interval_s
+    data = {
         "samples": clearest,
         "motions": motions,
-        "classes": list(shards.classes),
-        "stations": names,
+        "classes": list(classes),
+        "stations": stations,
+        "look_s": look_s,
+        "step_s": network.symbol_interval_s,
+    }
+    return {
+        "data": data,
+        "panels": panels(renderer),
+        "truths": truth_panels(network),
+        "size": renderer.images.size,
+        "shown": min(renderer.images.size, side),
+        "rows": len(stations),
+        "columns": spectra,
+        "pixels": network_side,
+        "stations": stations,
+        "floor_db": FLOOR_DB,
+        "look_s": look_s,
     }

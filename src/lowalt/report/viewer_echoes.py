@@ -50,8 +50,8 @@ def echoes(
     """Return the page's entries of a sample's signals (stations, symbols) complex, station by
     station.
 
-    geometry: of the sample's record, with `radial_mps` of each station, receding positive; None
-    where it has no place.
+    geometry: of the sample's record, with `range_m` and `radial_mps` of each station, receding
+    positive; None where it has no place.
     """
     entries = []
     for station, signal in zip(network.stations, signals, strict=True):
@@ -61,5 +61,6 @@ def echoes(
             shown = float(network.folded_mps(speed, station))
             folds = round(abs(speed - shown) / (2 * network.largest_mps(station)))
             entry |= {"speed": round(speed, 2), "shown": round(shown, 2), "folds": folds}
+            entry["range"] = round(geometry[station.name]["range_m"], 1)
         entries.append(entry)
     return entries

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from lowalt.config.brought import OF_TRAINING
 from lowalt.config.command import run
 from lowalt.config.layers import SCHEMA, load
 from lowalt.files.atomic import slug
@@ -122,7 +123,8 @@ def main(arguments: list[str]) -> None:
     line.add_argument("--clouds", help="folder of finished cloud files (default: clouds are made)")
     line.add_argument("--out", required=True, help="folder to write into")
     options = line.parse_args(arguments)
-    dataset = Dataset(load(options.config, SCHEMA), options.clouds, inputs=options.inputs)
+    config = load(options.config, SCHEMA, unused=("inputs", *OF_TRAINING))
+    dataset = Dataset(config, options.clouds, inputs=options.inputs)
     write_run(dataset, options.out, dataset.config["shards"]["kind"])
 
 

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from lowalt.config.blocks import motion_block
+from lowalt.config.brought import OF_TRAINING, refuse_brought
 from lowalt.config.layers import SCHEMA, check
 from lowalt.config.network import masts_m
 from lowalt.config.splits import FOLDS
@@ -23,7 +24,6 @@ from lowalt.motion.drawing import region_polygon
 from lowalt.motion.track_files import path_of
 from lowalt.motion.tracks import model_rows
 from lowalt.scene.effects import complete, needs_surfaces, of_record
-from lowalt.scene.trust import refuse_effects
 from lowalt.shards.maker import Maker
 from lowalt.shards.plan import GROUPS, Plan
 from lowalt.shards.remake import CloudFolder
@@ -137,7 +137,9 @@ class Dataset:
         if isinstance(config, (str, Path)):
             path = config
             config = check(load_yaml(config), shipped(SCHEMA))
-            refuse_effects(config["effects"], path)
+            # The folder of inputs is an argument here, and no network is trained.
+            unused = ("inputs", *OF_TRAINING)
+            refuse_brought({key: config[key] for key in config if key not in unused}, path)
         self.config = config
         if records is None and (published is None or clouds is None):
             # A run's configuration names tables and records as seen from the checkout it was made

@@ -9,7 +9,6 @@ import hashlib
 import io
 import json
 from collections.abc import Iterable, Iterator
-from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from types import ModuleType
 
@@ -23,6 +22,7 @@ from lowalt.files.atomic import existing, sha256
 from lowalt.files.errors import InputError
 from lowalt.files.json_objects import json_object
 from lowalt.scene.lateness import lateness
+from lowalt.scene.trust import refuse_effects
 from lowalt.shards.clean import complex_signals, noisy, unpacked
 from lowalt.shards.index import WHAT, checked, load
 from lowalt.shards.plan import GROUPS
@@ -122,22 +122,33 @@ class ShardSet:
         if shard not in self._tables:
             entry = self.shards[shard]
             name = table_path(entry["path"])
-            most = entry["samples"] * SAMPLE.itemsize + MOST_OVERHEAD_BYTES
-            place: AbstractContextManager[Path] = nullcontext(Path(self.index_path).parent / name)
             if self.remote:
                 store = store_of(self.scheme)
-                place = store.fetched(store.beside(self._base, name.as_posix()), most)
-            with place as path:
-                samples = map_samples(path)
-                if len(samples) != entry["samples"] or (
-                    self.check and sha256(path) != entry["table_sha256"]
-                ):
-                    raise InputError(
-                        f"{path.name}: damaged or another table: {len(samples)} rows, expected {entry['samples']}, and "
-                        "the SHA-256 that the index states"
-                    )
-            self._tables[shard] = samples
+                address = store.beside(self._base, name.as_posix())
+                most = entry["samples"] * SAMPLE.itemsize + MOST_OVERHEAD_BYTES
+                with store.fetched(address, most) as path:
+                    self._tables[shard] = self._checked_table(path, entry, address)
+            else:
+                path = Path(self.index_path).parent / name
+                self._tables[shard] = self._checked_table(path, entry, str(path))
         return self._tables[shard]
+
+    def _checked_table(self, path: Path, entry: dict, named: str) -> np.ndarray:
+        """The rows of a shard's table in a file, checked against the shard's entry of the index.
+
+        named: what a sentence calls the table, since the copy of a remote one is temporary.
+        """
+        try:
+            samples = map_samples(path)
+        except InputError as error:
+            raise InputError(str(error).replace(str(path), named)) from None
+        whole = len(samples) == entry["samples"]
+        if not whole or (self.check and sha256(path) != entry["table_sha256"]):
+            raise InputError(
+                f"{named}: damaged or another table: {len(samples)} rows, expected "
+                f"{entry['samples']}, and the SHA-256 that the index states"
+            )
+        return samples
 
     def tables(self) -> Iterator[tuple[dict, np.ndarray]]:
         """Yield each shard's entry of the index and its rows (`samples.map_samples`), of one shard
@@ -302,6 +313,7 @@ class ShardSet:
         effects = (self.index.get("echo") or {}).get("effects", {})
         if render["spectra"].get("times") != "known":
             return None
+        refuse_effects(effects, self.index_path)
         entry = self.record(number)
         return lateness(
             render["spectra"], effects, self.renderer.network, entry["seed"], row_of(entry)[0]

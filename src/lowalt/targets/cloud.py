@@ -172,6 +172,7 @@ def _facts(cloud: Cloud) -> Iterator[tuple[bool, str]]:
     """
     missing = {"subtype", "category", "source", "checksum"} - set(cloud.record)
     yield not missing, f"record lacks {sorted(missing)}"
+    classes.refuse_subtype(cloud.record["subtype"], "record")
     classes.like(cloud.record)
     factors = cloud.record.get("rate_factors", {})
     yield (

@@ -10,7 +10,7 @@ by that source's own `check_record`.
 import math
 from pathlib import Path
 
-from lowalt.config.classes import AIRBORNE, classes_of, like
+from lowalt.config.classes import AIRBORNE, classes_of, like, refuse_subtype
 from lowalt.files.csv_tables import read_csv
 from lowalt.files.errors import InputError, reading
 from lowalt.files.yaml_files import load_yaml
@@ -58,6 +58,7 @@ def load_table(path: str | Path) -> dict[str, dict]:
     for row in rows:
         name = row["name"]
         where = f"{path}: {row['name']}"
+        refuse_subtype(name, path)
         if name in table:
             raise InputError(f"{where}: named twice, expected one row per subtype")
         if row["unseen_protocol"] not in ("seen", "unseen"):
@@ -176,6 +177,7 @@ def with_row(row: dict | None, name: str, cells: object, where: str) -> dict:
     Raises: InputError naming `where`, the column and the value that is missing, unknown or no
     positive number.
     """
+    refuse_subtype(name, where.rpartition(": ")[0] or where)
     known = [column for column in COLUMNS if column not in ("name", "idx")]
     if not isinstance(cells, dict) or set(cells) - set(known):
         raise InputError(f"{where}: row is {cells!r}, expected cells of the columns {known}")

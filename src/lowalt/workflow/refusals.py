@@ -10,6 +10,7 @@ import itertools
 from collections.abc import Collection
 from pathlib import Path
 
+from lowalt.config.brought import OF_TRAINING, refuse_brought
 from lowalt.config.classes import AIRBORNE, CATEGORIES
 from lowalt.config.layers import plain
 from lowalt.config.named_code import file_of, own_effects
@@ -120,6 +121,11 @@ def refuse_input(config: dict) -> None:
         raise InputError(
             f"recognition.input: 'dataset' together with the effects {own}, expected shards"
         )
+    if block.get("input") == "dataset":
+        # The jobs read the run's own config.yaml, which may be a stranger's for all they know.
+        unused = ("inputs", *OF_TRAINING)
+        used = {key: value for key, value in config.items() if key not in unused}
+        refuse_brought(used, "recognition.input: 'dataset'")
     if block.get("input") == "dataset" and block["cache"]:
         raise InputError(
             "recognition.input: 'dataset' together with recognition.cache true, expected cache: "

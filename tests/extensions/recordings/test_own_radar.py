@@ -6,12 +6,13 @@ import re
 
 import numpy as np
 import pytest
+import torch
 import yaml
 from scipy.io import wavfile
 
 from lowalt.__main__ import main as lowalt
 from lowalt.extensions.recordings.files import Baseband, read
-from lowalt.extensions.recordings.own_radar import snr_range, temperature, trained_radar
+from lowalt.extensions.recordings.own_radar import calibrated, snr_range, temperature, trained_radar
 from lowalt.extensions.recordings.record import read_record, record
 from lowalt.extensions.recordings.twin import twin_of
 from lowalt.extensions.recordings.twin_scenes import Library
@@ -247,3 +248,15 @@ def test_a_record_becomes_a_network_that_predicts_in_any_folder(tmp_path, capsys
     assert "- Few were tested.\n" in card and re.search(
         r"It classifies [\d.]+ % of 4 simulated windows", card
     )
+
+
+def test_a_calibrated_network_divides_its_logits_by_the_temperature():
+    torch.manual_seed(1)
+    network = torch.nn.Module()
+    network.classifier = torch.nn.Sequential(
+        torch.nn.Linear(5, 4), torch.nn.ReLU(), torch.nn.Linear(4, 3)
+    )
+    samples = torch.randn(6, 5)
+    logits = network.classifier(samples)
+    network.load_state_dict(calibrated(network.state_dict(), 2.5))
+    torch.testing.assert_close(network.classifier(samples), logits / 2.5)

@@ -53,6 +53,8 @@ COLUMNS = (
     "answers_sha256",
     "code",
 )
+PLAIN = re.compile(r"[^\W_][^<>|=`\x00-\x1f\x7f]*")
+"""Texts of a card that enter the table: no formula of a table calculation, no markup of a page."""
 ANSWERS = re.compile(r"(?P<track>[a-z0-9-]+)-(?P<seed>\d+)\.csv")
 
 
@@ -76,6 +78,12 @@ def read(folder: str | Path) -> Submission:
         raise InputError(
             f"{folder}/card.yaml: missing {missing}, unknown {unknown}, expected {list(CARD)}"
         )
+    for name in ("method", "chosen_on", "code"):
+        if not PLAIN.fullmatch(str(card[name])):
+            raise InputError(
+                f"{folder}/card.yaml: {name} is {shown(card[name])}, expected text that begins with a "
+                "letter or digit, without <>|=` and control characters"
+            )
     answers: dict[str, list[Path]] = {}
     for path in sorted(folder.glob("*.csv")):
         found = ANSWERS.fullmatch(path.name)

@@ -24,6 +24,7 @@ from lowalt.extensions.recordings.mat_files import read_mat
 from lowalt.extensions.recordings.record import Record
 from lowalt.files.atomic import text_file
 from lowalt.files.errors import InputError, lacking
+from lowalt.files.inside import inside
 from lowalt.files.json_objects import read_object
 
 SAME_CARRIER = 1e-3
@@ -328,6 +329,8 @@ def _sigmf(path: Path, record: Record) -> Table:
         raise InputError(
             f"{path}: core:dataset is {dataset!r}, expected the name of a file beside it"
         )
+    if dataset is not None:
+        inside(path.parent, dataset, str(path), "core:dataset")
     mixed = _other_bytes(path, metadata)
     try:
         signal = sigmf.sigmffile.fromfile(str(path))

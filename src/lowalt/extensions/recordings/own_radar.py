@@ -14,6 +14,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
+import torch
 from scipy.optimize import minimize_scalar
 from torch import nn
 
@@ -81,6 +82,19 @@ def last_layer(tensors: Iterable[str]) -> str:
     return max(layers, key=lambda layer: [int(number) for number in layer.split(".")[1:]])
 
 
+def calibrated(tensors: dict[str, torch.Tensor], temperature: float) -> dict[str, torch.Tensor]:
+    """Return a network's tensors with its last layer divided by `temperature`, and so its logits.
+
+    Source: as `temperature`.
+    """
+    last = last_layer(tensors)
+    result = dict(tensors)
+    for key in tensors:
+        if key.rpartition(".")[0] == last:
+            result[key] = tensors[key] / temperature
+    return result
+
+
 def trained_radar(record: Record, out: Path, block: dict) -> dict:
     """Train a network for the radar of a record, write OUT.safetensors, its weights in 8 bits, and
     its card; return what to expect of it.
@@ -111,13 +125,8 @@ def trained_radar(record: Record, out: Path, block: dict) -> dict:
         content = of_run(Path(folder) / "model.safetensors")
     validation, test = (folds[fold].facts.label for fold in ("validation", "test"))
     warm = temperature(_shares(network, folds["validation"]), validation)
-    last = last_layer(content.tensors)
-    cooled = {
-        key: value / warm if key.rpartition(".")[0] == last else value
-        for key, value in content.tensors.items()
-    }
     path = out.with_name(f"{name}.safetensors")
-    content = replace(content, tensors=cooled)
+    content = replace(content, tensors=calibrated(content.tensors, warm))
     reduced = zoo.small(content)
     exact, entry = (of_file(weights, path) for weights in (content, reduced))
     shares = _shares(entry.model, folds["test"])

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from lowalt.report.figures.style import COLOURS, SNR_LABELS, plain
-from lowalt.report.plots import Plot, drawn
+from lowalt.report.plots import NARROW_IN, Plot, drawn
 
 PAGE_WIDTH = 960
 CELL = 46
@@ -36,11 +36,11 @@ def _rows_over_snr(ours: dict, published: dict) -> Iterator[dict]:
                         }
 
 
-def over_snr(ours: dict, published: dict) -> Plot:
+def over_snr(ours: dict, published: dict, narrow: bool = False) -> Plot:
     """Return accuracy over SNR, one panel per protocol, with the paper's values dashed.
 
     ours, published: protocol -> scheme -> SNR label -> percent; the published ones are those on the
-    paper's data.
+    paper's data; narrow: one panel below the other.
     """
     rows = list(_rows_over_snr(ours, published))
     infinite = set(SNR_LABELS.values())
@@ -50,9 +50,13 @@ def over_snr(ours: dict, published: dict) -> Plot:
     schemes = list(dict.fromkeys(row["scheme"] for row in rows))
     colours = {scheme: COLOURS[number % len(COLOURS)] for number, scheme in enumerate(schemes)}
     names = [f"{protocol} subtypes" for protocol in ours]
-    height = 4 + 0.2 * math.ceil(len(schemes) / 4)
-    figure = Figure(figsize=(6.5 * len(names), height), layout="constrained")
-    panels = plain(figure.subplots(1, len(names), sharey=True, squeeze=False))
+    columns = 1 if narrow else len(names)
+    lines = math.ceil(len(names) / columns)
+    legend_columns = 2 if narrow else 4
+    wide = NARROW_IN if narrow else 6.5 * columns
+    high = 4 * lines + 0.2 * math.ceil(len(schemes) / legend_columns)
+    figure = Figure(figsize=(wide, high), layout="constrained")
+    panels = plain(figure.subplots(lines, columns, sharey=True, squeeze=False))
     for panel, name in zip(panels, names, strict=True):
         for scheme, source in dict.fromkeys((row["scheme"], row["source"]) for row in rows):
             line = [
@@ -68,26 +72,28 @@ def over_snr(ours: dict, published: dict) -> Plot:
                 color=colours[scheme],
             )
         panel.set(title=name, xlabel="SNR (dB)", xticks=range(len(levels)), xticklabels=levels)
-    figure.axes[0].set_ylabel("accuracy (%)")
+    for panel in panels[::columns]:
+        panel.set_ylabel("accuracy (%)")
     handles = [Line2D([], [], color=colour, label=scheme) for scheme, colour in colours.items()]
     handles += [
         Line2D([], [], linestyle=style, color="0.5", label=source)
         for source, style in SOURCES.items()
     ]
-    figure.legend(handles=handles, loc="outside lower center", ncols=4, frameon=False)
+    figure.legend(handles=handles, loc="outside lower center", ncols=legend_columns, frameon=False)
     return drawn(
         "accuracy_over_snr", "recognition accuracy over SNR by scheme and protocol", figure, rows
     )
 
 
-def confusion(counts: dict, categories: tuple[str, ...]) -> Plot:
+def confusion(counts: dict, categories: tuple[str, ...], narrow: bool = False) -> Plot:
     """Return row-normalised confusion matrices, one per (protocol, scheme).
 
-    counts: as returned by `pivots.confusion`. A class without samples has dashes in its row. With
-    more classes, fewer matrices are placed side by side.
+    counts: as returned by `pivots.confusion`; narrow: one matrix below the other. A class without
+    samples has dashes in its row. With more classes, fewer matrices are placed side by side.
     """
     count = len(categories)
-    columns = max(1, min(len(counts), PAGE_WIDTH // (CELL * count + 40)))
+    fitting = PAGE_WIDTH // (CELL * count + 40)
+    columns = 1 if narrow else max(1, min(len(counts), fitting))
     side = (CELL * count + 40) / 72
     figure = Figure(
         figsize=(columns * side, math.ceil(len(counts) / columns) * (side + 0.6)),
@@ -132,11 +138,13 @@ def confusion(counts: dict, categories: tuple[str, ...]) -> Plot:
     return drawn("confusion", "confusion matrices in percent of the true class", figure, rows)
 
 
-def confusion_by_snr(rows: list[dict[str, str]], categories: tuple[str, ...]) -> Plot:
+def confusion_by_snr(
+    rows: list[dict[str, str]], categories: tuple[str, ...], narrow: bool = False
+) -> Plot:
     """Return what each class is taken for at each SNR, as a panel per protocol and true class.
 
     A panel has a bar per SNR of the shares (percent) of all answers. rows: those of
-    confusion_by_snr.csv, one scheme per protocol.
+    confusion_by_snr.csv, one scheme per protocol; narrow: two panels side by side.
     """
     counts = {
         (row["protocol"], row["snr_db"], row["category"], row["predicted"]): int(row["samples"])
@@ -145,9 +153,10 @@ def confusion_by_snr(rows: list[dict[str, str]], categories: tuple[str, ...]) ->
     schemes = {row["protocol"]: row["scheme"] for row in rows}
     levels = sorted({row["snr_db"] for row in rows}, key=float)
     shown_in_panels = list(product(schemes, categories))
-    columns = min(len(categories), 4)
+    columns = min(len(categories), 2 if narrow else 4)
     height = math.ceil(len(shown_in_panels) / columns)
-    figure = Figure(figsize=(3.2 * columns, 2.4 * height + 0.5), layout="constrained")
+    wide = NARROW_IN if narrow else 3.2 * columns
+    figure = Figure(figsize=(wide, 2.4 * height + 0.5), layout="constrained")
     panels = plain(figure.subplots(height, columns, sharex=True, sharey=True, squeeze=False))
     shown: list[dict] = []
     for panel, (protocol, true) in zip(panels, shown_in_panels, strict=False):
@@ -173,7 +182,8 @@ def confusion_by_snr(rows: list[dict[str, str]], categories: tuple[str, ...]) ->
                         "percent": shares[line, column].round(2),
                     }
                 )
-        panel.set(title=f"{true}, {protocol} subtypes", ylim=(0, 100))
+        panel.set_title(f"{true}, {protocol} subtypes", fontsize=9 if narrow else None)
+        panel.set_ylim(0, 100)
         panel.set_xticks(range(len(levels)), [SNR_LABELS.get(snr, snr) for snr in levels])
         panel.grid(visible=False)
     for panel in panels[len(shown_in_panels) :]:
@@ -181,7 +191,10 @@ def confusion_by_snr(rows: list[dict[str, str]], categories: tuple[str, ...]) ->
     figure.supxlabel("SNR (dB)")
     figure.supylabel("recognised as (%)")
     figure.legend(
-        *panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=8, frameon=False
+        *panels[0].get_legend_handles_labels(),
+        loc="outside upper center",
+        ncols=2 * columns,
+        frameon=False,
     )
     words = "what each class is taken for at each SNR, in percent of its samples"
     return drawn("confusion_by_snr", words, figure, shown)

@@ -12,7 +12,7 @@ from lowalt.config.command import run
 from lowalt.files.atomic import write_file
 from lowalt.files.csv_tables import read_csv
 from lowalt.report.figures.style import COLOURS, plain
-from lowalt.report.plots import Plot, drawn
+from lowalt.report.plots import NARROW_IN, Plot, drawn
 
 RECOGNITION = (
     "scheme",
@@ -57,16 +57,16 @@ def _rows(rows: list[dict[str, str]]) -> list[dict]:
     return data
 
 
-def recognition(rows: list[dict[str, str]]) -> Plot:
+def recognition(rows: list[dict[str, str]], narrow: bool = False) -> Plot:
     """Plot unseen accuracy against the time for data and training, with its Pareto front.
 
     rows: of accuracy_cost.csv (keys RECOGNITION); trained ones are drawn, the first scheme with a
     ring. Bars are 95 % intervals
     of the difference to the first scheme; if they contain zero the point is grey. The band spans
-    all points not significantly different.
+    all points not significantly different. narrow: for telephones.
     """
     data = _rows(rows)
-    figure = Figure(figsize=(9.4, 6), layout="constrained")
+    figure = Figure(figsize=(NARROW_IN, 5) if narrow else (9.4, 6), layout="constrained")
     (panel,) = plain(figure.subplots(squeeze=False))
     same = [row["accuracy_percent"] for row in data if row["same"]]
     panel.axhspan(min(same), max(same), color="0.5", alpha=0.2, linewidth=0)
@@ -118,7 +118,6 @@ def recognition(rows: list[dict[str, str]]) -> Plot:
                 (7, -7),
                 textcoords="offset points",
                 va="top",
-                bbox={"color": "white", "alpha": 0.7, "pad": 0.5},
             )
     panel.set(
         xscale="log",
@@ -128,7 +127,9 @@ def recognition(rows: list[dict[str, str]]) -> Plot:
     )
     for axis in (panel.xaxis.set_major_formatter, panel.xaxis.set_minor_formatter):
         axis("{x:g}")
-    panel.tick_params(axis="x", which="both", length=3.5, pad=3.5)
+    panel.tick_params(
+        axis="x", which="both", length=3.5, pad=3.5, labelrotation=90 if narrow else 0
+    )
     panel.margins(x=0.15)
     panel.legend(loc="lower right", frameon=False)
     words = (
@@ -143,10 +144,11 @@ def seconds(row: dict[str, str]) -> float:
     return float(row["core_s_data"]) + float(row["core_s_training"])
 
 
-def echo(measured: list[dict[str, str]]) -> Plot:
+def echo(measured: list[dict[str, str]], narrow: bool = False) -> Plot:
     """Plot the error of a signal against its time, one line per method and tolerance.
 
-    A line joins the numbers of points. measured: rows of cost.csv (keys ECHO).
+    A line joins the numbers of points. measured: rows of cost.csv (keys ECHO); narrow: for
+    telephones.
     """
     rows = [
         {
@@ -159,7 +161,7 @@ def echo(measured: list[dict[str, str]]) -> Plot:
         for row in measured
     ]
     methods = list(dict.fromkeys(row["method"] for row in rows))
-    figure = Figure(figsize=(9.4, 6), layout="constrained")
+    figure = Figure(figsize=(NARROW_IN, 5) if narrow else (9.4, 6), layout="constrained")
     (panel,) = plain(figure.subplots(squeeze=False))
     panel.axhline(STORED, color="0.5", linestyle="--")
     panel.annotate(
@@ -197,7 +199,10 @@ def echo(measured: list[dict[str, str]]) -> Plot:
     )
     for points, size in sizes.items():
         panel.scatter([], [], size, color="0.5", label=f"{points} points")
-    panel.legend(frameon=False)
+    if narrow:
+        figure.legend(loc="outside upper center", ncols=2, frameon=False)
+    else:
+        panel.legend(frameon=False)
     words = "error of an echo signal over its time, by method, tolerance and number of points"
     return drawn("echo_cost", words, figure, rows)
 

@@ -48,7 +48,7 @@ def _limits(points: np.ndarray) -> tuple[np.ndarray, float]:
     return (flat.min(axis=0) + flat.max(axis=0)) / 2, 0.58 * float(np.ptp(flat, axis=0).max())
 
 
-def _view(
+def draw_view(
     panel,
     cloud: Cloud,
     points: np.ndarray,
@@ -56,8 +56,8 @@ def _view(
     middle: np.ndarray,
     half: float,
 ) -> None:
-    """Draw points (L, 3) m and the bones between them as seen along one axis, in a square of half
-    width `half`.
+    """Draw points (L, 3) m and the bones between them as seen along one axis, one of DIRECTIONS, in
+    a square around `middle` (3,) m of half width `half` (m).
     """
     title, across, up = view
     panel.scatter(points[:, across], points[:, up], s=6, c=_colours(cloud), linewidths=0)
@@ -205,7 +205,7 @@ def _instants(panels, cloud: Cloud, row: dict) -> None:
         # Two blades look the same after half a turn, so an eighth of the cycle is added in each
         # panel.
         step = int(step / 2) if "rotor" in cloud.kinds or "wheel" in cloud.kinds else int(step)
-        _view(panel, cloud, frames[step], view, middle, half)
+        draw_view(panel, cloud, frames[step], view, middle, half)
         panel.plot(frames[:, tips, across], frames[:, tips, up], color="tab:red", linewidth=0.7)
         panel.plot(
             frames[step, tips, across], frames[step, tips, up], "o", color="tab:red", markersize=4
@@ -230,7 +230,7 @@ def target_picture(cloud: Cloud, config_path: Path = CONFIG, seed: int = 1) -> b
     points = cloud.track[0] if len(cloud.track) else cloud.points
     middle, half = _limits(points)
     for panel, view in zip(views, DIRECTIONS, strict=True):
-        _view(panel, cloud, points, view, middle, half)
+        draw_view(panel, cloud, points, view, middle, half)
         _marks(panel, cloud, view, middle, half)
     _instants(instants, cloud, row)
     _spectra(spectra, cloud, row, config)

@@ -5,6 +5,7 @@ from pathlib import Path
 from lowalt.files.csv_tables import read_csv
 from lowalt.report.figures.accuracy_plots import over_snr
 from lowalt.report.pivots import by_scheme, macro_f1, spreads
+from lowalt.report.plots import for_every_width
 from lowalt.report.reported_run import ReportedRun
 
 COLUMNS = ("protocol", "scheme", "snr_db", "accuracy_percent")
@@ -42,5 +43,5 @@ def values(run: ReportedRun) -> dict:
         "snrs": run.snr_labels,
         "macro_f1": macro_f1(measured),
         "network": network_words(run.config["recognition"]),
-        "plot": over_snr(ours, paper) if ours else None,
+        "plot": for_every_width(over_snr, ours, paper) if ours else None,
     }

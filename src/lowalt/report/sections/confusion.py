@@ -2,6 +2,7 @@
 
 from lowalt.report.figures import accuracy_plots
 from lowalt.report.pivots import best_schemes, by_scheme, confusion
+from lowalt.report.plots import for_every_width
 from lowalt.report.reported_run import ReportedRun
 from lowalt.report.sections import accuracy
 
@@ -19,6 +20,6 @@ def values(run: ReportedRun) -> dict | None:
     best = best_schemes(by_scheme(run.inputs.table("accuracy", *accuracy.COLUMNS)))
     chosen = [row for row in rows if row["scheme"] == best[row["protocol"]]]
     return {
-        "plot": accuracy_plots.confusion(confusion(rows), classes),
-        "by_snr": accuracy_plots.confusion_by_snr(chosen, classes),
+        "plot": for_every_width(accuracy_plots.confusion, confusion(rows), classes),
+        "by_snr": for_every_width(accuracy_plots.confusion_by_snr, chosen, classes),
     }

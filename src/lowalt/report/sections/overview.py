@@ -15,26 +15,19 @@ TILES = 4
 """Most tiles at the top of the page."""
 
 
-def verdict(paper: float | None, classes: int, seeds: int) -> str:
-    """Return sentences that help to judge an average accuracy (percent); paper: the published one,
-    or None.
-    """
+def verdict(entries: list[dict], classes: int) -> str:
+    """Return sentences that help to judge the entries of `accuracies`, said once for all of them."""
     words = [f"Chance level is {100 / classes:.0f} %."]
-    if paper is not None:
-        words.append(
-            f"The paper reports {paper:.1f} %; its data are not public, so the figures are not "
-            "comparable."
-        )
-    if seeds < 3:
-        words.append("One training seed; another seed changes this by about one point.")
+    if any(entry["paper"] is not None for entry in entries):
+        words.append("The paper's data are not public, so its figures are not comparable.")
+    if any(entry["seeds"] < 3 for entry in entries):
+        words.append("One training seed; another seed changes an accuracy by about one point.")
     return " ".join(words)
 
 
-def accuracies(
-    rows: list[dict[str, str]], published: list[dict[str, str]], classes: int
-) -> list[dict]:
-    """Return one entry per protocol: scheme of highest average, its accuracy, interval of macro F1,
-    and a verdict.
+def accuracies(rows: list[dict[str, str]], published: list[dict[str, str]]) -> list[dict]:
+    """Return one entry per protocol: scheme of highest average, its accuracy beside the paper's,
+    interval of macro F1, and number of training seeds.
     """
     ours = by_scheme(rows)
     paper = by_scheme(published)
@@ -43,7 +36,6 @@ def accuracies(
     for protocol, scheme in best_schemes(ours).items():
         here = ours[protocol][scheme]["avg"]
         there = paper.get(protocol, {}).get(scheme, {}).get("avg")
-        seeds = max(int(row["seeds"]) for row in rows)
         entries.append(
             {
                 "protocol": protocol,
@@ -51,7 +43,7 @@ def accuracies(
                 "percent": here,
                 "paper": there,
                 "interval": intervals.get(protocol, {}).get(scheme, ""),
-                "words": verdict(there, classes, seeds),
+                "seeds": max(int(row["seeds"]) for row in rows),
             }
         )
     return entries
@@ -63,6 +55,7 @@ def values(run: ReportedRun) -> dict:
         read_csv(run.inputs.path("published"), *COLUMNS) if "published" in run.inputs else []
     )
     measured = run.inputs.table("accuracy", *COLUMNS, "seeds", "spread_points")
+    best = accuracies(measured, published)
     tiles = [(caption, embedded(data)) for caption, data in example_tiles(run.shards)[:TILES]]
     return {
         "seed": run.config["seed"],
@@ -76,6 +69,7 @@ def values(run: ReportedRun) -> dict:
         "hardware": describe(),
         "station_names": run.stations,
         "spectra": [name.upper() for name in named(run.config["spectra"])],
-        "accuracies": accuracies(measured, published, len(run.shards.classes)),
+        "accuracies": best,
+        "verdict": verdict(best, len(run.shards.classes)) if best else "",
         "tiles": tiles,
     }

@@ -3,6 +3,7 @@ reference.
 """
 
 from lowalt.report.figures import cost_plots
+from lowalt.report.plots import for_every_width
 from lowalt.report.reported_run import ReportedRun
 
 SHOWN = (
@@ -31,5 +32,5 @@ def values(run: ReportedRun) -> dict | None:
         "rows": rows,
         "presets": presets,
         "hardware": rows[0]["hardware"],
-        "plot": cost_plots.recognition(rows),
+        "plot": for_every_width(cost_plots.recognition, rows),
     }

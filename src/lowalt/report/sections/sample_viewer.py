@@ -1,12 +1,28 @@
-"""Section: a viewer of some samples: echoes, tile with axes, probabilities of the networks, motion
-in 3-D.
-"""
+"""Section: a viewer of some samples: cloud, truth, echoes, spectra, probabilities of the networks."""
+
+from collections.abc import Iterator
 
 from lowalt.config.named_code import own_effects
-from lowalt.report import viewer, viewer_echoes
+from lowalt.files.atomic import slug
+from lowalt.report import viewer
 from lowalt.report.reported_run import ReportedRun
-from lowalt.shards.remake import opened
+from lowalt.shards import ShardSet
+from lowalt.shards.remake import Remaker, opened
 from lowalt.targets.cloud import read
+
+
+def viewed(
+    shards: ShardSet, numbers: list[int], remaker: Remaker | None
+) -> Iterator[viewer.ViewedSample]:
+    """Yield samples of a data set by their numbers; remaker: makes signals again, None for a data
+    set that does not say how.
+    """
+    effects = (shards.index.get("echo") or {}).get("effects")
+    effect = "the scene's effects" if effects else viewer.WITHOUT
+    for number in numbers:
+        record = shards.record(number)
+        signal = remaker.signal(record) if remaker else None
+        yield viewer.ViewedSample(effect, record, shards.tile(number), signal)
 
 
 def values(run: ReportedRun) -> dict:
@@ -14,24 +30,21 @@ def values(run: ReportedRun) -> dict:
     clouds = {cloud.subtype: cloud for cloud in map(read, run.inputs.paths("clouds"))}
     files = run.inputs.paths("predictions")
     groups = {name: row["unseen_protocol"] for name, row in run.targets.items()}
-    network = run.shards.renderer.network
-    pixels = run.config["recognition"]["size"]
-    panels = viewer.panels(run.shards.renderer)
-    size = run.shards.index["render"]["images"]["size"]
-    echo = run.shards.index.get("echo")
+    unseen = {slug(name) for name, group in groups.items() if group == "unseen"}
+    shards = run.shards
+    numbers = viewer.chosen(shards, viewer.predicted_keys(files), unseen)
+    keys = {shards.keys[number].decode() for number in numbers}
+    echo = shards.index.get("echo")
     # The effects of a stranger's run may be code, so no page runs them.
     remaker = (
         opened(run.inputs.path("index")) if echo and not own_effects(echo["effects"]) else None
     )
-    return {
-        "data": viewer.samples(run.shards, remaker, clouds, files, groups, pixels),
-        "panels": panels,
-        "size": size,
-        "shown": min(size, viewer.PIXELS),
-        "rows": panels[-1]["row"] + 1,
-        "columns": panels[-1]["column"] + 1,
-        "pixels": pixels,
-        "stations": run.stations,
-        "floor_db": viewer_echoes.FLOOR_DB,
-        "look_s": network.symbols * network.symbol_interval_s,
-    }
+    return viewer.shown(
+        viewed(shards, numbers, remaker),
+        shards.renderer,
+        clouds,
+        groups,
+        shards.classes,
+        viewer.probabilities(files, keys, shards.classes),
+        (viewer.PIXELS, run.config["recognition"]["size"]),
+    )

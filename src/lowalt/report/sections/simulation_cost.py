@@ -1,6 +1,7 @@
 """Section: the echo's error against computing time, from the table of `make cost`."""
 
 from lowalt.report.figures import cost_plots
+from lowalt.report.plots import for_every_width
 from lowalt.report.reported_run import ReportedRun
 
 USUAL = 300
@@ -44,6 +45,6 @@ def values(run: ReportedRun) -> dict | None:
     return {
         "own": name == "echo_cost",
         "hardware": rows[0]["hardware"],
-        "plot": cost_plots.echo(rows),
+        "plot": for_every_width(cost_plots.echo, rows),
         "sentence": sentence(rows),
     }

@@ -2,7 +2,8 @@
 
 Three reference points stand around the station, 120 degrees apart. Each has a link without line of
 sight to the station, which sends and receives the rays of the link in the same directions. Nothing
-moves, so a canceller removes these echoes.
+moves, so a canceller removes these echoes. Without one they hide targets, because the clause counts
+the path loss one way. Indoor scenes, links, spatial consistency and blockage are left out.
 """
 
 import numpy as np

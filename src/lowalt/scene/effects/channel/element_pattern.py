@@ -1,7 +1,8 @@
 """The gain pattern of the antenna elements, which weights every echo on the way out and on the way
 back.
 
-Without this effect elements are isotropic. Reflected paths and the land have the gain in their own
+It falls by 12 (angle / width)^2 decibels in each plane, down to the level of the back lobe. Without
+this effect elements are isotropic. Reflected paths and the land have the gain in their own
 direction.
 """
 

@@ -1,7 +1,8 @@
 """Sampling-clock offset: the converter's clock runs fast or slow against the one that made the
 symbols.
 
-Sample instants shrink within a symbol, and the window slips from symbol to symbol, so ranges drift.
+Sample instants shrink within a symbol, and the window slips from symbol to symbol, so ranges drift:
+by c n T_r e / 2 until symbol n, where e is the relative error of the clock.
 """
 
 import math

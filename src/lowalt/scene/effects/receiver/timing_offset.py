@@ -1,8 +1,8 @@
 """Timing offset: the receive window starts late or early, and every echo seems nearer or farther.
 
-A window that starts within the cyclic prefix holds one whole period, so its offset is exactly a
-phase that is linear over the subcarriers. A scene in which the window can leave the prefix is
-refused.
+A window that starts within the cyclic prefix holds one whole period, so its offset d is exactly
+the phase 2 pi (m - M // 2) df d on subcarrier m. A scene in which the window can leave the prefix
+is refused.
 """
 
 import numpy as np

@@ -1,10 +1,11 @@
 """Power amplifier that saturates: the waveform is compressed, so subcarriers lose amplitude and
 disturb each other.
 
-The amplifier has no memory and no phase distortion. It acts on the OFDM symbol's time signal,
-sampled four times as often as the subcarriers need, so that distortion beyond the band leaves the
-band. Echoes are those of the distorted waveform; the receiver divides by the data it knows. A
-Gaussian signal comes out as a smaller copy of itself plus distortion (Bussgang).
+The amplifier has no memory and no phase distortion: an amplitude a, relative to saturation, becomes
+a / (1 + a^4)^(1/4). It acts on the OFDM symbol's time signal, sampled four times as often as the
+subcarriers need, so that distortion beyond the band leaves the band. Echoes are those of the
+distorted waveform; the receiver divides by the data it knows. A Gaussian signal comes out as a
+smaller copy of itself plus distortion (Bussgang).
 """
 
 import math

@@ -1,0 +1,78 @@
+"""The truth of the viewer's samples: the folded radial speed of every point over time, as a picture
+with the axes of a spectrum.
+"""
+
+import colorsys
+import io
+
+import numpy as np
+from PIL import Image
+
+from lowalt.config.network import Network, Station
+from lowalt.motion import positions
+from lowalt.report.figures.style import embedded
+from lowalt.targets.cloud import Cloud
+
+COLUMNS = 200
+ROWS = 100
+BODY = (138, 143, 152)
+"""Colour (RGB) of points of a target's body, which stands out on white and on black."""
+GOLDEN_DEG = 67
+"""Angle between the hues of two parts that follow each other."""
+STEP_S = 1e-6
+"""Half the time over which speeds are taken: rotors turn far between two symbols."""
+
+
+def colours(cloud: Cloud) -> list[tuple[int, int, int]]:
+    """Return the colour (RGB, 0 to 255) of each part of a cloud."""
+    found = []
+    for number, kind in enumerate(cloud.kinds):
+        hue = number * GOLDEN_DEG % 360 / 360
+        bright = colorsys.hls_to_rgb(hue, 0.5, 0.75)
+        found.append(BODY if kind == "body" else tuple(round(255 * share) for share in bright))
+    return found
+
+
+def ranges_m(places: np.ndarray, station: Station) -> np.ndarray:
+    """Return the range (...) m of places (..., 3) m, on a link half the way over its two ends."""
+    ends = [station] if station.transmitter is None else [station, station.transmitter]
+    ways = [np.linalg.norm(places - np.asarray(end.position_m), axis=-1) for end in ends]
+    return np.mean(ways, axis=0)
+
+
+def speeds_mps(cloud: Cloud, row: dict, station: Station, times_s: np.ndarray) -> np.ndarray:
+    """Return the radial speed (N, L) m/s of each point at times_s (N,), not folded, positive away
+    from the station.
+    """
+    before = ranges_m(positions(cloud, row, times_s - STEP_S), station)
+    after = ranges_m(positions(cloud, row, times_s + STEP_S), station)
+    return (after - before) / (2 * STEP_S)
+
+
+def truth(cloud: Cloud, row: dict, network: Network, points: np.ndarray) -> list[str]:
+    """Return a picture per station of the folded radial speeds of `points` (numbers) of a cloud, as
+    an embedded PNG without a background.
+
+    Columns: the look from left to right; rows: from the largest speed at the top down to its
+    negative; colours: of the points' parts, the body above the others.
+    """
+    look_s = network.symbols * network.symbol_interval_s
+    times_s = (np.arange(COLUMNS) + 0.5) / COLUMNS * look_s
+    part = cloud.part[points]
+    # The last colour written stays.
+    order = points[np.argsort(-part, kind="stable")]
+    palette = [channel for colour in [(0, 0, 0), *colours(cloud)] for channel in colour]
+    pictures = []
+    for station in network.stations:
+        largest = network.largest_mps(station)
+        shown = network.folded_mps(speeds_mps(cloud, row, station, times_s)[:, order], station)
+        rows = np.clip((1 - shown / largest) / 2 * ROWS, 0, ROWS - 1).astype(int)
+        indices = np.zeros((ROWS, COLUMNS), np.uint8)
+        for number, point in enumerate(order):
+            indices[rows[:, number], np.arange(COLUMNS)] = cloud.part[point] + 1
+        picture = Image.fromarray(indices, "P")
+        picture.putpalette(palette)
+        stream = io.BytesIO()
+        picture.save(stream, "png", optimize=True, transparency=0)
+        pictures.append(embedded(stream.getvalue()))
+    return pictures
