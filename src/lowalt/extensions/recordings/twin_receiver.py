@@ -26,12 +26,12 @@ class Receiver:
     wander_db: rms of a slow change of the amplitude; leak_db: a constant, over the echo; hum_db and
     hum_hz: a line, over the echo.
 
-    May be left out: hum_lines, how many harmonics the line has, each 1 / number as
-    strong; highpass_hz, corner of a Butterworth high pass, 0 Hz for none; clip_rms,
-    the largest amplitude over the rms of all samples, 0 for no limit; flicker_slope, exponent of
-    the slow noise's fall; gain_control, the share in decibels by which an automatic gain makes
-    strong and weak stretches alike, and gain_s, over which time it measures; bits, of the converter
-    at full scale, 0 for none.
+    May be left out: hum_lines, how many harmonics the line has, each 1 / number as strong;
+    highpass_hz, corner of a Butterworth high pass, 0 Hz for none; clip_rms, the largest amplitude
+    over the rms of all samples, 0 for no limit; flicker_slope, exponent of the slow noise's fall;
+    gain_control, the share in decibels by which an automatic gain makes strong and weak stretches
+    alike, and gain_s, over which time it measures; bits, of the converter at full scale, 0 for
+    none.
     """
 
     snr_db: float
