@@ -1,6 +1,4 @@
-"""The command `lowalt report`: the page of one run, or a page that links all runs and compares any
-two.
-"""
+"""The command `lowalt report`: the page of one run, or a page that links and compares all runs."""
 
 import argparse
 import tempfile
@@ -48,7 +46,9 @@ def run(options: argparse.Namespace) -> Answer:
         raise InputError(
             "report: expected the folder of a run, such as results/default, or --gallery"
         )
-    return gallery(options.results) if options.gallery else page(options)
+    if options.gallery:
+        return gallery(options.results)
+    return page(options)
 
 
 def page(options: argparse.Namespace) -> Answer:
@@ -63,7 +63,8 @@ def page(options: argparse.Namespace) -> Answer:
     written = f"results/{name}/report.html"
     if not isinstance(name, str) or options.run.resolve() != Path(written).parent.resolve():
         raise InputError(
-            f"{options.run}: its config.yaml is of the run {name!r}, expected to stand in results/{name}"
+            f"{options.run}: its config.yaml is of the run {name!r}, expected to stand in "
+            f"results/{name}"
         )
     _refuse_code(config, options.run)
     with tempfile.NamedTemporaryFile("w", suffix=".yaml") as overlay:
@@ -79,13 +80,16 @@ def page(options: argparse.Namespace) -> Answer:
             "printshellcmds": False,
         }
         ran = workflow.ended(argparse.Namespace(**vars(options) | line))
-    files = [] if options.dry_run or ran["status"] else [written]
+    files = []
+    if not options.dry_run and ran["status"] == 0:
+        files.append(written)
     return Answer({"files": files, **ran}, "".join(files), ran["status"])
 
 
 def _refuse_code(config: dict, folder: Path) -> None:
-    """Refuse a run whose configuration, or whose table of schemes, names code, weights or files
-    elsewhere, which the workflow would use.
+    """Refuse a run that names code, weights or files elsewhere, which the workflow would use.
+
+    Both its configuration and its table of schemes are looked at.
     """
     check(config, shipped(SCHEMA))
     how = (
@@ -117,7 +121,8 @@ def gallery(results: Path) -> Answer:
     write_file(
         results / "index.html", all_runs({path.name: facts(path) for path in folders}, pages)
     )
-    text = f"{results / 'index.html'}: {len(folders)} run{'s' if len(folders) > 1 else ''}"
-    return Answer(
-        {"files": [results / "index.html"], "runs": [path.name for path in folders]}, text
-    )
+    index = results / "index.html"
+    names = [path.name for path in folders]
+    plural = "s" if len(folders) > 1 else ""
+    text = f"{index}: {len(folders)} run{plural}"
+    return Answer({"files": [index], "runs": names}, text)

@@ -27,20 +27,19 @@ SCHEMA = "workflow/schemas/config.schema.yaml"
 
 
 def merge(base: dict, overlay: dict) -> dict:
-    """Return `base` with `overlay` laid over it: mappings merge key by key, anything else is
-    replaced.
-    """
+    """Return `base` with `overlay` laid over it: mappings merge by key, the rest is replaced."""
     result = dict(base)
     for key, value in overlay.items():
-        both = isinstance(value, dict) and isinstance(result.get(key), dict)
-        result[key] = merge(result[key], value) if both else value
+        lower = result.get(key)
+        if isinstance(value, dict) and isinstance(lower, dict):
+            result[key] = merge(lower, value)
+        else:
+            result[key] = value
     return result
 
 
 def canonical(value: object) -> str:
-    """Return the canonical JSON text of a settings block: keys are sorted, so equal settings give
-    equal texts.
-    """
+    """Return the JSON text of a settings block with sorted keys: equal settings, equal texts."""
     return json.dumps(plain(value), sort_keys=True, allow_nan=False)
 
 
@@ -49,32 +48,33 @@ def _may_be_null(entry: dict) -> bool:
     return "null" in entry.get("type", ()) or any(map(_may_be_null, entry.get("oneOf", ())))
 
 
+def _entry(schema: dict, key: str) -> object:
+    """The entry of a schema for a key of its block: by name, by a pattern, or for further keys."""
+    if key in schema.get("properties", {}):
+        return schema["properties"][key]
+    for pattern, entry in schema.get("patternProperties", {}).items():
+        if re.search(pattern, key):
+            return entry
+    return schema.get("additionalProperties", {})
+
+
 def _without_nulls(block: object, schema: dict) -> None:
-    """Remove nulls from a block and its inner blocks, for optional keys whose schema does not allow
-    null.
-    """
+    """Remove nulls of optional keys whose schema allows none, from a block and its inner blocks."""
     if isinstance(block, list):
         for item in block:
             _without_nulls(item, schema.get("items", {}))
     if not isinstance(block, dict):
         return
-    needed, known, further = (
-        schema.get(key, {}) for key in ("required", "properties", "additionalProperties")
-    )
     for key, value in list(block.items()):
         if not isinstance(key, str):
             raise InputError(
                 f"configuration: key {key!r} among {list(block)}, expected text: put it in quotes"
             )
-        patterns = (
-            entry
-            for pattern, entry in schema.get("patternProperties", {}).items()
-            if re.search(pattern, key)
-        )
-        entry = known.get(key, next(patterns, further))
+        entry = _entry(schema, key)
         if not isinstance(entry, dict):
             continue
-        if value is None and key not in needed and not _may_be_null(entry):
+        optional = key not in schema.get("required", ())
+        if value is None and optional and not _may_be_null(entry):
             del block[key]
         else:
             _without_nulls(value, entry)
@@ -91,8 +91,9 @@ def _listed(lines: list[str]) -> str:
 
 
 def _without_ofdm(network: dict) -> None:
-    """Remove the default's subcarriers from a network whose waveform has none, and a waveform block
-    that says OFDM.
+    """Remove the default's subcarriers from a network whose waveform has none.
+
+    A waveform block that says OFDM is removed too, since OFDM is what a network without one has.
     """
     if network.get("waveform") == {"kind": "ofdm"}:
         del network["waveform"]
@@ -110,19 +111,20 @@ def _with_subcarriers(network: dict) -> None:
         return
     if "waveform" in network:
         raise InputError(
-            f"network.bandwidth_hz: {bandwidth_hz:g}, expected of OFDM only; the band of a sweep is sweep_hz"
+            f"network.bandwidth_hz: {bandwidth_hz:g}, expected of OFDM only; the band of a sweep "
+            "is sweep_hz"
         )
     count = round(bandwidth_hz / network["subcarrier_spacing_hz"])
     if not 1 <= count <= MOST_SUBCARRIERS:
         raise InputError(
-            f"network.bandwidth_hz: {bandwidth_hz:g} is {count} subcarriers, expected 1 to {MOST_SUBCARRIERS}"
+            f"network.bandwidth_hz: {bandwidth_hz:g} is {count} subcarriers, expected 1 to "
+            f"{MOST_SUBCARRIERS}"
         )
     network["subcarriers"] = count
 
 
 def check(config: dict, schema_path: str | Path) -> dict:
-    """Return the configuration if it fits the schema, without the nulls that remove keys of a lower
-    layer.
+    """Return the configuration if it fits the schema, without the nulls that remove keys.
 
     A layer can only add keys to a mapping. A null therefore removes an optional key, such as a
     station, a spectrum or an effect. A number may be written 28e9. If the waveform has no
@@ -168,12 +170,11 @@ def load(
     schema_path: str | Path,
     unused: Iterable[str] = OF_TRAINING,
 ) -> dict:
-    """Return the checked configuration of a base file and its overlays, in order, each a path or a
-    dict.
+    """Return the checked configuration of a base file and its overlays, in order.
 
-    A file that is not in the working directory is taken from the package. unused: as in
-    `read_layer`, by default the blocks that making samples does not use. The embedded default
-    belongs to the checkout and is trusted.
+    Each layer is a path or a dict. A file that is not in the working directory is taken from the
+    package. unused: as in `read_layer`, by default the blocks that making samples does not use. The
+    embedded default belongs to the checkout and is trusted.
     Raises: InputError naming file, key and value.
 
         >>> paths = ["config/default.yaml", "config/tiny.yaml"]

@@ -1,5 +1,4 @@
-"""Writes a whole data set from its configuration and clouds in one process, with the same bytes as
-the workflow.
+"""Writes a whole data set in one process, with the same bytes as the workflow.
 
 `python -m lowalt.shards.build` writes clouds, motion tables and shards; echoes are only kept in
 memory.
@@ -27,9 +26,9 @@ from lowalt.targets.cloud import write as write_cloud
 
 
 def write_run(dataset: Dataset, folder: str | Path, kind: str, clouds: bool = True) -> dict:
-    """Write the shards of all groups and folds of a data set, its motion tables and clouds below
-    `folder`, as the workflow does; return the index.
+    """Write all shards of a data set, its motion tables and clouds; return the index.
 
+    The files lie below `folder` as the workflow writes them.
     kind: "image", "signal", "recipe" or "cube"; clouds: whether cloud files are written too.
     Raises: InputError naming the sample that cannot be computed.
     """
@@ -51,13 +50,13 @@ def write_run(dataset: Dataset, folder: str | Path, kind: str, clouds: bool = Tr
 
 def rows_of(dataset: Dataset, chunk: str) -> list[dict]:
     """Return the motion table of one chunk."""
-    group, (first, count) = chunk.partition("-")[0], dataset.plan.span(chunk)
-    places = [
-        Place(group, subtype, model, 0.0)
-        for model in range(first, first + count)
-        for subtype in dataset.plan.chunk(chunk).members
-    ]
-    return [dataset.row(place) for place in places]
+    group, _, _ = chunk.partition("-")
+    first, count = dataset.plan.span(chunk)
+    rows = []
+    for model in range(first, first + count):
+        for subtype in dataset.plan.chunk(chunk).members:
+            rows.append(dataset.row(Place(group, subtype, model, 0.0)))
+    return rows
 
 
 def write_chunk(dataset: Dataset, folder: Path, chunk: str, kind: str) -> list[Path]:
@@ -75,14 +74,16 @@ def write_chunk(dataset: Dataset, folder: Path, chunk: str, kind: str) -> list[P
     maker.kept = len(rows)
 
     def content(number: int, level: int) -> tuple[bytes, dict]:
-        """Data of one sample (row `number` at SNR `level` of the chunk), and the part of its record
-        about cubes.
+        """Data of one sample, and what its record says of cubes.
+
+        number: of its row of the chunk; level: index of its SNR.
         """
+        row = rows[number]
         if kind == "recipe":
-            return npy(maker.received(rows[number])[0]), {}
-        return maker.data(
-            kind, maker.signal(rows[number], levels[level]), rows[number], levels[level], cells
-        )
+            echoes, _ = maker.received(row)
+            return npy(echoes), {}
+        snr_db = levels[level]
+        return maker.data(kind, maker.signal(row, snr_db), row, snr_db, cells)
 
     powers = None
     effects = maker.echo["effects"]

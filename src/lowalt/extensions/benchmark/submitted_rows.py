@@ -1,5 +1,4 @@
-"""Rows that others submit: a folder of submissions is scored anew, and its table is written from it
-alone.
+"""Rows that others submit: a folder of submissions is scored anew and its table written from it.
 
 A submission is a folder NAME with card.yaml and a file of answers TRACK-SEED.csv per track and
 training seed. The card has one line for each of CARD, and perhaps `confirmed`: by track, what
@@ -100,8 +99,9 @@ def read(folder: str | Path) -> Submission:
 
 
 def row(submitted: Submission, track: Track) -> dict:
-    """Return the table's row of a submission on a track, scored from its files. Raises: as
-    `submission.read`.
+    """Return the table's row of a submission on a track, scored from its files.
+
+    Raises: as `submission.read`.
     """
     paths = submitted.answers[track.name]
     found = scores(track, [submission.read(path, track) for path in paths], {})

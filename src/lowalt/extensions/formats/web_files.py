@@ -1,6 +1,4 @@
-"""Byte ranges of a data set's files on a web server, and the addresses of files below the folder of
-its index.
-"""
+"""Byte ranges of a data set's files on a web server, and the addresses of these files."""
 
 import functools
 import os
@@ -18,9 +16,9 @@ MOST_REDIRECTS = 5
 
 
 def beside(index: str, name: str) -> str:
-    """Return the address of a file by its path relative to the folder of an index; the index's
-    query is kept.
+    """Return the address of a file by its path relative to the folder of an index.
 
+    The index's query is kept.
     Characters with a meaning in addresses are escaped, so the name cannot lead to another server or
     query.
     """
@@ -30,9 +28,7 @@ def beside(index: str, name: str) -> str:
 
 @functools.cache
 def _session(process: int) -> Any:
-    """The open connections of a process; a worker must not share those of the process that it was
-    forked from.
-    """
+    """The open connections of a process, never those of the process that it was forked from."""
     # Imported here: who reads from disk need not wait for it.
     import requests
 
@@ -85,7 +81,8 @@ def span(address: str, first: int, most: int) -> bytes:
                     continue
                 if answer.status_code == requests.codes.ok:
                     raise InputError(
-                        f"{address}: the server sends whole files only, expected one that sends byte ranges"
+                        f"{address}: the server sends whole files only, expected one that sends "
+                        "byte ranges"
                     )
                 if answer.status_code != requests.codes.partial_content:
                     raise InputError(
@@ -94,16 +91,18 @@ def span(address: str, first: int, most: int) -> bytes:
                 return next(answer.iter_content(most), b"")
     except requests.RequestException as error:
         # What ended the last of several attempts.
-        cause = getattr(error.args[0], "reason", error) if error.args else error
+        cause: Exception = error
+        if error.args:
+            cause = getattr(error.args[0], "reason", error)
         raise InputError(f"{address}: cannot be read ({in_one_line(cause)})") from None
     raise InputError(f"{address}: cannot be read (more than {MOST_REDIRECTS} redirects)")
 
 
 @contextmanager
 def fetched(address: str, most: int) -> Iterator[Path]:
-    """Yield a temporary copy of the first `most` bytes of a file; a memory map of it remains valid
-    afterwards.
+    """Yield a temporary copy of the first `most` bytes of a file.
 
+    A memory map of it remains valid afterwards.
     Raises: as `span`.
     """
     with tempfile.TemporaryDirectory() as folder:

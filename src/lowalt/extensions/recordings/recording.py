@@ -201,7 +201,7 @@ def _inspect(options: argparse.Namespace) -> Answer:
     seen = inspection.readings[options.take - 1]
     out = options.out or _draft_path(inspection.path)
     ready = bool(inspection.carrier_hz and inspection.rate_hz)
-    if ready and out.exists() and not out.read_text(errors="replace").startswith(DRAFTED):
+    if ready and out.is_file() and not out.read_text(errors="replace").startswith(DRAFTED):
         raise InputError(f"{out}: is there already and no draft, expected --out with another name")
     picture = Path(f"{options.file.stem}-inspect.png")
     write_file(
