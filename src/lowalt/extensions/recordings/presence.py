@@ -218,7 +218,7 @@ def _continued(over: np.ndarray, level: float, weaker: float, reach: int) -> np.
     found = over.max(axis=1) >= level
     lines = over >= weaker
     near = maximum_filter1d(lines.astype(np.uint8), 2 * reach + 1, axis=1, mode="constant") > 0
-    continues = (lines[1:] & near[:-1]).any(axis=1)
+    continues = np.any(lines[1:] & near[:-1], axis=1)
     for later in range(1, len(found)):
         found[later] |= found[later - 1] and continues[later - 1]
     for earlier in range(len(found) - 2, -1, -1):
