@@ -192,7 +192,8 @@ def test_pipes_and_devices_are_no_files(name, tmp_path):
     for path in (tmp_path / name, tmp_path / f"zero-{name}"):
         # A record of a recording refuses links out of its folder before it looks at the file.
         with pytest.raises(
-            InputError, match="is a pipe, socket or device, expected a regular file|a link to /dev/"
+            InputError,
+            match=r"is a pipe, socket or device, expected a regular file|a link to /dev/",
         ):
             reads(path)
 
