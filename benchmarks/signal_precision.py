@@ -18,7 +18,7 @@ import numpy as np
 from lowalt.config.layers import overlaid
 from lowalt.files.csv_tables import write_csv
 from lowalt.shards.dataset import Dataset, Place
-from lowalt.shards.sample_record import parts_of
+from lowalt.shards.sample_record import real_and_imaginary
 from lowalt.shards.stored_cubes import restored, rounded
 
 COLUMNS = (
@@ -39,7 +39,7 @@ def halves(signal: np.ndarray) -> np.ndarray:
     power.
     """
     scale = np.sqrt(np.mean(np.abs(signal) ** 2))
-    parts = parts_of(signal / scale).astype(np.float16).astype(np.float32)
+    parts = real_and_imaginary(signal / scale).astype(np.float16).astype(np.float32)
     return ((parts[..., 0] + 1j * parts[..., 1]) * scale).astype(np.complex64)
 
 

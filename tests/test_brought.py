@@ -26,7 +26,7 @@ from lowalt.recognition.__main__ import main as recognition
 from lowalt.shards import ShardSet, index
 from lowalt.shards.build import write_run
 from lowalt.shards.dataset import Dataset
-from lowalt.shards.remake import opened, place_of
+from lowalt.shards.remake import number_of, opened
 from lowalt.tiles.tile_files import Tiles
 from small_configuration import configuration
 from trainings import SCHEME, SETTINGS, write_views
@@ -150,7 +150,7 @@ def test_an_index_with_a_damaged_setting_is_refused_in_one_line_or_makes_samples
         def remade():
             """Faults of a sample made again by the index as it is now."""
             remaker = opened(path)
-            return remaker.faults(place_of(remaker.shards, key))
+            return remaker.faults(number_of(remaker.shards, key))
 
         counted["refused" if line_of(remade) == "refused" else "made"] += 1
     assert counted["refused"] > 3 * counted["made"] > 0

@@ -213,10 +213,10 @@ def tokens(text: str) -> int:
 
 
 TOKENS = {
-    "files": 4466,
-    "machine": 2994,
+    "files": 5_342,
+    "machine": 3_401,
     "numerics": 9630,
-    "config": 7021,
+    "config": 7_902,
     "targets": 45724,
     "motion": 9026,
     "echo": 19774,
@@ -232,8 +232,8 @@ TOKENS = {
     "commands": 6429,
     "extensions/benchmark": 12325,
     "extensions/drafting": 27658,
-    "extensions/formats": 2180,
-    "extensions/recordings": 31329,
+    "extensions/formats": 2_307,
+    "extensions/recordings": 33_201,
     "extensions/town": 22928,
 }
 """Tokens of each room and extension. A commit that needs more than SLACK above it raises its figure

@@ -6,16 +6,17 @@ Stages have commands of their own (python -m lowalt.STAGE).
 """
 
 import argparse
-import os
 import signal
 import sys
 from importlib import import_module
 
 from lowalt.commands.command_table import COMMANDS
-from lowalt.config.command import refusal, warn_in_one_line
+from lowalt.config.command import REFUSALS, drop_output, refusal, warn_in_one_line
 from lowalt.config.core_commands import CORE_COMMANDS, Command
 from lowalt.config.extensions import extensions_in_words, function_offered
-from lowalt.files.errors import InputError
+from lowalt.files.atomic import FULL
+from lowalt.files.errors import InputError, in_plain_characters
+from lowalt.machine.memory import refuse_little
 
 
 def command_line(asked: str) -> argparse.ArgumentParser:
@@ -55,25 +56,15 @@ def _add(commands: argparse._SubParsersAction, name: str, entry: Command) -> Non
 def main(arguments: list[str] | None = None) -> int:
     """Run one command of `lowalt`; returns the exit status."""
     words = sys.argv[1:] if arguments is None else arguments
-    line = command_line(next((word for word in words if not word.startswith("-")), ""))
-    options = line.parse_args(words)
-    if options.act is None:
-        return 2
-    warn_in_one_line()
     try:
-        answer = options.act(options)
-        text = answer.text
-        if options.json:
-            from lowalt.commands.command_line import as_json
-
-            text = as_json(answer.facts)
-        if text:
-            print(text, flush=True)
+        return _acted(words)
     except BrokenPipeError:
-        # The reader, such as `head`, has closed its end; Python would try again when it ends.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        # The reader, such as `head`, has closed its end.
+        drop_output()
         return 128 + signal.SIGPIPE
-    except (InputError, OSError, ImportError) as error:
+    except REFUSALS as error:
+        if isinstance(error, OSError) and error.errno in FULL:
+            drop_output()
         print(f"error: {refusal(error)}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
@@ -82,6 +73,31 @@ def main(arguments: list[str] | None = None) -> int:
             file=sys.stderr,
         )
         return 128 + signal.SIGINT
+
+
+def _acted(words: list[str]) -> int:
+    """Run the command of these words; returns its exit status. Raises: as the command does."""
+    asked = next((word for word in words if not word.startswith("-")), "")
+    if asked in COMMANDS:
+        refuse_little()
+    try:
+        options = command_line(asked).parse_args(words)
+    except SystemExit:
+        # Help goes to standard output, which may be full.
+        sys.stdout.flush()
+        raise
+    if options.act is None:
+        return 2
+    warn_in_one_line()
+    answer = options.act(options)
+    text = answer.text
+    if options.json:
+        from lowalt.commands.command_line import as_json
+
+        text = as_json(answer.facts)
+    if text:
+        print(in_plain_characters(text))
+    sys.stdout.flush()
     return answer.status
 
 

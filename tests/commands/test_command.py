@@ -27,7 +27,7 @@ def test_settings_come_as_json_or_as_a_file(tmp_path):
         ("{", "not settings, expected a JSON object"),
         # Of a long text the first 80 characters are shown.
         ("{" + 90 * "a", rf"^--settings '{{{79 * 'a'}': not settings"),
-        (f"[{90 * '1'}]", rf"^--settings '\[{79 * '1'}': not settings \(list, expected"),
+        (f'["{90 * "1"}"]', rf"^--settings '\[\"{78 * '1'}': not settings \(list, expected"),
         ("[1]", "list, expected a JSON object"),
         ("@none.json", "no file at none.json"),
     ],
@@ -66,8 +66,9 @@ def test_a_path_that_the_system_refuses_is_named_in_one_line(tmp_path, monkeypat
         and said.startswith(f"error: {file}/below: Not a directory")
         and said.count("\n") == 1
     )
-    with pytest.raises(OSError, match="space"):
-        refusal(OSError(errno.ENOSPC, "no space", "file"))
+    assert refusal(OSError(errno.ENOSPC, "no space", "a")) == "a: no space, expected room to write"
+    with pytest.raises(OSError, match="broken"):
+        refusal(OSError(errno.EIO, "broken", "file"))
 
 
 def test_a_package_that_is_not_installed_is_named_with_the_command_that_installs_it(

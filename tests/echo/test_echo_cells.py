@@ -1,6 +1,4 @@
-"""Range cells from a target's moments: the tabulated kernels, and the bound on the cells that are
-not computed.
-"""
+"""Range cells from a target's moments: kernels in tables, and the bound on cells left out."""
 
 import numpy as np
 import pytest
@@ -11,7 +9,7 @@ from test_echo import network, relative
 import pointwise_echo
 from lowalt.config.network import SPEED_OF_LIGHT, Network, Station
 from lowalt.echo import Rigid, echo_signal
-from lowalt.echo.fast.cell_kernel import PLACES, SIDE, cell_polynomials
+from lowalt.echo.fast.cell_kernel import POSITIONS, SIDE, cell_polynomials
 from lowalt.echo.fast.polynomials import CELL_REACH
 from lowalt.echo.fast.strongest_cell import far_limit, far_moments
 
@@ -29,8 +27,8 @@ def test_tabulated_kernels_keep_their_error(count, deep, error):
     assert table.error <= error
     v = np.linspace(-1, 1, 31)
     powers = v[:, None] ** np.arange(table.kernels.shape[2])
-    for place in (0, 7, PLACES):
-        u = place / PLACES - 0.5 + table.half * v
+    for place in (0, 7, POSITIONS):
+        u = place / POSITIONS - 0.5 + table.half * v
         for j in range(-SIDE, SIDE + 1):
             found = powers @ table.kernels[place, j + SIDE]
             assert abs(found - kernel(j - u, count)).max() <= table.error + 1e-13
@@ -41,7 +39,7 @@ def test_tabulated_kernels_keep_their_error(count, deep, error):
 def test_targets_too_deep_and_too_few_cells_are_left_to_the_general_kernel():
     # A cell SIDE and a half away, seen from the deepest point, is as far as the rule of its kernel
     # holds.
-    deepest = CELL_REACH - SIDE - 0.5 - 0.5 / PLACES
+    deepest = CELL_REACH - SIDE - 0.5 - 0.5 / POSITIONS
     assert (
         cell_polynomials(256, deepest, 1e-6) is not None
         and cell_polynomials(256, deepest + 1e-9, 1e-6) is None
@@ -58,7 +56,7 @@ def test_targets_too_deep_and_too_few_cells_are_left_to_the_general_kernel():
     points=st.integers(1, 60),
     deep=st.floats(0.01, 1.5),
     count=st.integers(20, 300),
-    place=st.integers(0, PLACES),
+    place=st.integers(0, POSITIONS),
     side=st.integers(2, SIDE),
     error=st.sampled_from([1e-4, 1e-12]),
 )
@@ -72,7 +70,7 @@ def test_no_cell_beyond_the_bound_is_stronger(seed, points, deep, count, place, 
     powers = v[:, None] ** np.arange(table.kernels.shape[2])
     sums = z @ powers
     far = np.empty(4)
-    centre = place / PLACES - 0.5
+    centre = place / POSITIONS - 0.5
     total = abs(z).sum()
     second = (abs(z) * v**2).sum()
     far_moments(
@@ -96,8 +94,9 @@ def test_no_cell_beyond_the_bound_is_stronger(seed, points, deep, count, place, 
 
 
 def test_moments_of_far_cells_are_bounded_with_the_orders_that_the_series_of_the_sine_lacks():
-    """|sum z sin(pi u) y^k| of points at one end of the stretch, where a sine of few orders is cut
-    the most.
+    """Sums of points at one end of the stretch, where a sine of few orders is cut most.
+
+    Each is |sum z sin(pi u) y^k|.
     """
     table = cell_polynomials(64, 0.3, 1e-2)
     for place, v in ((3, 1.0), (16, -1.0), (29, 0.9)):
@@ -114,7 +113,7 @@ def test_moments_of_far_cells_are_bounded_with_the_orders_that_the_series_of_the
             table.error,
             far,
         )
-        sine = abs(2 - 1j) * np.sin(np.pi * (place / PLACES - 0.5 + y))
+        sine = abs(2 - 1j) * np.sin(np.pi * (place / POSITIONS - 0.5 + y))
         assert (far >= abs(sine) * abs(y) ** np.arange(4)).all()
 
 
@@ -140,8 +139,9 @@ def test_parts_that_do_not_turn_are_placed_as_if_turned_by_zero():
 
 
 def test_a_point_half_way_between_two_cells_is_counted_as_a_tie_and_one_off_it_is_not():
-    """Both neighbours hold equal amplitudes there; a hundredth of a cell away they differ by more
-    than a percent.
+    """Both neighbours hold equal amplitudes there.
+
+    A hundredth of a cell away they differ by more than a percent.
     """
     station = Station("A", (0.0, 0.0, 0.0), 0.0, 4.9e9)
     net = Network(4.9e9, 120e3, 256, 10, 2.5e-3, 400, (1, 1), (1, 1), 1.0, (station,))

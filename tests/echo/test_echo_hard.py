@@ -1,5 +1,6 @@
-"""The echo's hard cases by name, each judged in 50 digits: right cell, small error, a bound that
-holds.
+"""The echo's hard cases by name, each judged in 50 digits.
+
+Each has the right cell, a small error and a bound that holds.
 
 The cases stand in `tests/support/hard_cases.py`.
 """
@@ -26,8 +27,9 @@ def test_hard_case(name):
 
 
 def seen(name):
-    """Ranges (m) of a case's points and of its aim, and their direction cosines across and up, by
-    dot products.
+    """Ranges (m) of a case's points and of its aim, and direction cosines across and up.
+
+    All are dot products.
     """
     case = CASES[name]
     assert case.station.position_m == (0.0, 0.0, 25.0) and case.station.normal_rad == 0

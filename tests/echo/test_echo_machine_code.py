@@ -1,5 +1,6 @@
-"""Kept machine code follows what it is compiled from: kernels, constants and settings, however
-deep, and no more.
+"""Kept machine code follows what it is compiled from, and no more.
+
+That is kernels, constants and settings, however deep.
 """
 
 import shutil
@@ -49,7 +50,7 @@ EDITS = {
     ),
     "a function that is not compiled": (
         "echo/fast/polynomials.py",
-        "nodes = min(count, 32)",
+        "nodes = min(count, MOST_RATES)",
         "nodes = 31",
         [0, 0],
     ),

@@ -1,5 +1,6 @@
-"""Poses and exact echoes have the same bytes whatever the processor: other ones are emulated in
-processes of their own.
+"""Poses and exact echoes have the same bytes whatever the processor.
+
+Other processors are emulated in processes of their own.
 
 The quick test takes numpy's and the BLAS's vector instructions away. The slow one also compiles the
 kernels for two other processors, which takes some minutes the first time.
@@ -105,8 +106,9 @@ def digest(count: int) -> str:
 
 
 def digest_on(processor: dict[str, str], count: int, folder: Path) -> str:
-    """The digest as a process of its own computes it, its libraries and compiler told of another
-    processor.
+    """The digest that a process of its own computes.
+
+    Its libraries and compiler are told of another processor.
     """
     call = [sys.executable, "-c", f"from test_echo_portable import digest; print(digest({count}))"]
     paths = os.pathsep.join([str(Path(__file__).parent), *sys.path])

@@ -1,5 +1,6 @@
-"""What the echo proves of itself: extents of a target, segments of symbols, each part of the bound,
-and the lead.
+"""What the echo proves of itself.
+
+These are a target's extents, segments of symbols, each part of the bound, and the lead.
 """
 
 import dataclasses
@@ -14,7 +15,7 @@ import pointwise_echo
 from lowalt.config.network import Station
 from lowalt.echo import Rigid, api, echo_signal, refine
 from lowalt.echo.fast import error_model
-from lowalt.echo.fast.cell_kernel import PLACES
+from lowalt.echo.fast.cell_kernel import POSITIONS
 from lowalt.echo.fast.error_model import echo_plan, pointwise_bound
 from lowalt.echo.fast.range_bounds import (
     END,
@@ -76,8 +77,9 @@ def test_no_point_lies_beyond_the_extents_of_its_target(rigid, stretched):
 
 @pytest.mark.parametrize("seed", range(6))
 def test_segments_hold_their_symbols_directions_and_are_as_long_as_the_first_one_allows(seed):
-    """A segment takes symbols while the union of their intervals, times the rate, is within the
-    first one's room.
+    """A segment takes symbols while their intervals leave room.
+
+    The union of the intervals, times the rate, is within the first one's room.
     """
     draws = np.random.default_rng(seed)
     extents = np.zeros((60, 5))
@@ -120,8 +122,10 @@ SMALL = 1e-4
 
 
 def bounded(monkeypatch, plan: dict, cells: dict, array: tuple[int, int] = (16, 4)) -> tuple:
-    """A signal of one symbol whose plan and cell kernels have these errors: (result, its bound, sum
-    of peak amplitudes, the points' distances from the reference)."""
+    """A signal of one symbol whose plan and cell kernels have these errors.
+
+    It is (result, its bound, sum of peak amplitudes, the points' distances from the reference).
+    """
     net = network(symbols=1, transmit=array, receive=array)
     motion = cloud_in_motion(np.random.default_rng(2), 1, 30, (200.0, 90.0, 60.0), 0.3)
     made = error_model.echo_plan
@@ -146,8 +150,9 @@ def bounded(monkeypatch, plan: dict, cells: dict, array: tuple[int, int] = (16, 
 
 
 def test_each_kind_of_error_adds_its_own_part_to_the_bound(monkeypatch):
-    """Relative to the sum of amplitudes, to that of peak amplitudes, to amplitudes times distances,
-    and to moments.
+    """Errors relative to each of four sums.
+
+    These are of amplitudes, of peak amplitudes, of amplitudes times distances, and of moments.
     """
     found, bound, peaks, away = bounded(monkeypatch, {}, {})
     total = found.totals[0]
@@ -177,8 +182,9 @@ def test_each_kind_of_error_adds_its_own_part_to_the_bound(monkeypatch):
 
 
 def test_roundings_of_higher_moments_count_with_the_points_distances_from_the_place(monkeypatch):
-    """v is a point's range in cells beyond the nearest of the places for which kernels stand, over
-    the plan's half.
+    """v is a point's range in cells beyond the nearest place with a kernel.
+
+    It is divided by the plan's half.
     """
     halves = []
     tabulated = refine.cell_polynomials
@@ -190,7 +196,7 @@ def test_roundings_of_higher_moments_count_with_the_points_distances_from_the_pl
     motion = cloud_in_motion(np.random.default_rng(2), 1, 30, (200.0, 90.0, 60.0), 0.3)
     cells = np.linalg.norm(positions(motion)[0] - SEEN.position_m, axis=1) / NET.cell_m
     centre = np.linalg.norm(motion.translation[0, 0] - SEEN.position_m) / NET.cell_m
-    v = (cells - np.rint(centre * PLACES) / PLACES) / halves[0].half
+    v = (cells - np.rint(centre * POSITIONS) / POSITIONS) / halves[0].half
     assert second / total == pytest.approx(np.average(v**2, weights=cells**-2.0), rel=0.01, abs=0)
     assert mixed / total == pytest.approx(np.sqrt(second / total), rel=1e-6, abs=0)
 
@@ -204,8 +210,9 @@ def test_an_error_of_the_sums_takes_twice_its_size_from_the_lead(monkeypatch):
 
 @pytest.mark.parametrize("error", [0.0, 1e-7, 1e-3])
 def test_a_plan_allows_for_what_its_cosine_and_sine_leave_out_and_round(error):
-    """Order k of a series in t^2 rounds 2 k + 2 times by Horner's rule, weighted by its coefficient
-    at half a turn.
+    """Order k of a series in t^2 rounds 2 k + 2 times by Horner's rule.
+
+    It is weighted by its coefficient at half a turn.
     """
     plan = echo_plan(radar(NET, SEEN), 400, error)
     t = np.linspace(0, 0.5, 400).astype(np.longdouble)
@@ -228,17 +235,16 @@ def test_the_pointwise_bound_allows_for_roundings_of_the_phase_of_large_targets(
 
 
 def on_axis(cells: float) -> tuple[Station, np.ndarray]:
-    """A station at the origin that looks along x, and one point there so many range cells away, (1,
-    1, 3).
+    """A station at the origin that looks along x, and a point so many cells away.
+
+    Its place has the shape (1, 1, 3).
     """
     station = dataclasses.replace(SEEN, position_m=(0.0, 0.0, 0.0), normal_rad=0.0)
     return station, np.array([[[cells * NET.cell_m, 0.0, 0.0]]])
 
 
 def test_the_pointwise_bound_of_one_point_in_the_beam_is_that_of_its_sum_and_of_its_direction():
-    """At a whole cell the value is the amplitude, and on the axis the peak one, so both parts count
-    once.
-    """
+    """At a whole cell the value is the amplitude and on the axis the peak one: both count once."""
     station, place = on_axis(30.0)
     found = pointwise_echo.signal(NET, station, place, 1.0, place[0, 0])
     share, direction = found.method.pointwise_bound
@@ -250,9 +256,7 @@ def test_the_pointwise_bound_of_one_point_in_the_beam_is_that_of_its_sum_and_of_
 
 
 def test_a_proved_lead_is_the_computed_one_less_the_bounds_of_both_cells():
-    """A point so near the middle between two cells that the bounds are a good part of what they
-    differ by.
-    """
+    """A point so near the middle of two cells that the bounds are a good part of the difference."""
     station, place = on_axis(30.5 + 4e-13)
     arguments = (NET, station, place, 1.0, place[0, 0])
     strengths = np.sort(abs(pointwise_echo.range_cells(*arguments)[0]))
@@ -286,8 +290,10 @@ def test_no_cell_beyond_the_pointwise_bound_is_stronger(seed):
 
 
 def test_the_plan_follows_size_range_and_tolerance(always_approximate):
-    """A target that is large against its range, or against a range cell, goes point by point; eight
-    symbols pay for no cheap plan, and all symbols are counted once."""
+    """A target that is large against its range, or against a range cell, goes point by point.
+
+    Eight symbols pay for no cheap plan, and all symbols are counted once.
+    """
     net = network(symbols=60)
     for away_m, size_m, tolerance, kind in (
         ((200, 30, 60), 0.3, None, "exact"),

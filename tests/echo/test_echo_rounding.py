@@ -1,5 +1,6 @@
-"""Exact values round to complex64 as the true values do: the double-double sums, the decision, the
-strongest cell.
+"""Exact values round to complex64 as the true values do.
+
+Tested are the double-double sums, the decision and the strongest cell.
 """
 
 from types import SimpleNamespace
@@ -28,8 +29,9 @@ def exact(pair) -> mpmath.mpf:
 
 
 def nearest_single(value: mpmath.mpf) -> np.float32:
-    """The float32 nearest to a number of many digits, ties to even, by exact comparison of its
-    neighbours.
+    """The float32 nearest to a number of many digits, ties to even.
+
+    Its neighbours are compared exactly.
     """
     guess = np.float32(float(value))
     near = [np.nextafter(guess, np.float32(way)) for way in (-np.inf, np.inf)] + [guess]
@@ -67,9 +69,7 @@ def test_array_sums_hold_twenty_digits_and_their_limits(count):
 
 
 def prepared(net, station, motion, rcs, aim):
-    """What `echo_signal` prepares and computes before values are rounded: (arguments of
-    `nearest.correct`).
-    """
+    """The arguments of `nearest.correct` in an `echo_signal`: all before values are rounded."""
     scene, radio, refs, aims = api.prepared(net, station, motion, rcs, aim, "")
     found, _, method, sample = refine.compute(scene, radio, refs, aims, None)
     return sample, refs, found, method.pointwise_bound

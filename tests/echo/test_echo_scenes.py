@@ -1,6 +1,4 @@
-"""Some of the random scenes of `benchmarks/echo_scenes.py`, and tests that their check finds
-errors.
-"""
+"""Some random scenes of `benchmarks/echo_scenes.py`, and that their check finds errors."""
 
 import sys
 from pathlib import Path

@@ -1,5 +1,6 @@
-"""A tolerance is kept: errors stay below proved bounds, looser ones are cheaper, polynomials keep
-their bounds.
+"""A tolerance is kept: errors stay below proved bounds, and looser ones are cheaper.
+
+Polynomials keep their bounds.
 """
 
 import mpmath

@@ -61,7 +61,7 @@ def test_every_method_has_the_strongest_of_the_cells_in_fifty_digits(count):
     motion, rcs, aim = given
     truth = []
     for n in range(3):
-        at = fifty_digits.places_mp(motion, n)
+        at = fifty_digits.positions_mp(motion, n)
         np.testing.assert_allclose(np.array(at, float), places(motion)[n], rtol=1e-13)
         cells = [
             complex(cell)

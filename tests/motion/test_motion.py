@@ -76,8 +76,9 @@ def test_blade_tip_moves_at_two_pi_rate_times_radius():
 
 
 def turning_cloud(kind: str, points: list, hinges: list, axes: list, **more) -> Cloud:
-    """A body of one point and parts of one kind, a point each; `more`: names or parents, and facts
-    of the record.
+    """A body of one point and parts of one kind, a point each.
+
+    `more` are names or parents, and facts of the record.
     """
     count = len(points) + 1
     nothing = [np.nan] * 3

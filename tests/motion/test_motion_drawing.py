@@ -1,5 +1,6 @@
-"""Motion models: the table's round trip, ranges of draws, named streams, and the region between the
-masts.
+"""Motion models: the table's round trip, ranges of draws, streams and the region.
+
+The region lies between the masts, and streams are found by name.
 """
 
 import math

@@ -1,6 +1,4 @@
-"""Each column of the motion table: its range, its distribution, and that it is drawn independently
-of the others.
-"""
+"""Each column of the motion table: its range, its distribution, and independent draws."""
 
 import itertools
 import math
@@ -43,8 +41,9 @@ WALK = {"speed_lo": 0.2, "speed_hi": 1.5}
 
 
 def cloud_of_class(category):
-    """A built-in target of a class; for pedestrians, whose nodes need the published recordings, a
-    small recording.
+    """A built-in target of a class.
+
+    Pedestrians' nodes need the published recordings, so they come from a small one.
     """
     if category == "Pedestrian":
         return recorded_cloud(origin_height_m=0.9, track_speed_mps=1.25), WALK
@@ -71,8 +70,7 @@ def drawn(category):
 
 
 def drawn_quantities(cloud, ranges, columns):
-    """The quantities that are drawn, (ROWS,) each with its least and largest value, and the columns
-    that they decide.
+    """The drawn quantities (ROWS,), each with its range, and the columns that they decide.
 
     A velocity on the ground is that of a speed ahead; a resized target's rate falls as its size
     grows.

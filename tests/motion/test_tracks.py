@@ -1,5 +1,6 @@
-"""Tracks: state goes on from look to look, a fold takes a track whole, and a flight log comes back
-from the records.
+"""Tracks: state goes on from look to look, and a flight log comes back from the records.
+
+A fold takes a track whole.
 """
 
 import itertools
@@ -54,8 +55,9 @@ def dataset():
 
 
 def flight(time_s: np.ndarray) -> np.ndarray:
-    """A parabola in the middle of the cell: differences of second order and cubics have no error on
-    it.
+    """A parabola in the middle of the cell.
+
+    Differences of second order and cubics have no error on it.
     """
     return np.stack([200 + 3 * time_s, 100 + 0.5 * time_s + 0.2 * time_s**2, 50 + time_s], axis=-1)
 
@@ -87,16 +89,18 @@ def looks_of(dataset: Dataset, subtype: str, track: int) -> list[dict]:
 
 
 def places_of(config: dict) -> tuple[np.ndarray, np.ndarray, dict]:
-    """Masts (S, 2) m, corners (K, 2) m of the region, and the settings of the motion of a
-    configuration.
+    """Masts (S, 2) m, corners (K, 2) m of the region, and the settings of the motion.
+
+    They are those of a configuration.
     """
     masts = np.array(masts_m(config["network"]), float)
     return masts, region_polygon(masts, None), motion_block(config)
 
 
 def goes_on(cloud, rows: list[dict]):
-    """Assert that all points end a look where they begin the next: place, heading, phases of parts
-    and gait at once.
+    """Assert that all points end a look where they begin the next.
+
+    That is place, heading, phases of parts and gait at once.
     """
     for row, after in itertools.pairwise(rows):
         ends = positions(cloud, row, np.array([1.0]))
@@ -166,7 +170,7 @@ def test_a_target_turns_to_climb_the_other_way_while_it_can_still_go_on_for_a_lo
             "yaw_rad": 0.0,
         }
         path = drawn_path(rng, row | {"vz_mps": rng.uniform(-1, 1)}, cell, (40.0, 46.0), 30, 1.0)
-        ahead = path.place_m[:, 2] + path.velocity_mps[:, 2]
+        ahead = path.position_m[:, 2] + path.velocity_mps[:, 2]
         assert ahead.min() >= 40 and ahead.max() <= 46
 
 

@@ -1,5 +1,6 @@
-"""Large matrices in a written order: against the small ones' sums, NumPy's decompositions, and
-exact integrals.
+"""Large matrices in a written order: against small ones, NumPy and exact integrals.
+
+NumPy's are its decompositions, the small ones' their sums.
 """
 
 import numpy as np
@@ -58,8 +59,9 @@ def test_gauss_and_legendre_s_rule_is_numpy_s(count):
 
 @pytest.mark.parametrize(("nodes", "spread"), [(1, 0.02), (1, 2.0), (7, 0.1), (1, 64.0)])
 def test_tables_of_a_band_give_the_waves_that_they_stand_for(nodes, spread):
-    """Moments of single points at places u, against exp(-j 2 pi spread x u / 2) itself at every
-    subcarrier.
+    """Moments of single points at places u, against exp(-j 2 pi spread x u / 2) itself.
+
+    They are compared at every subcarrier.
     """
     count = 64
     u = np.linspace(-1, 1, 9)

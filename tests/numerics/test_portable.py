@@ -1,6 +1,4 @@
-"""Portable arithmetic against exact values, and draws against NumPy's of today and against their
-distributions.
-"""
+"""Portable arithmetic against exact values, and draws against NumPy's and distributions."""
 
 import pickle
 

@@ -1,5 +1,6 @@
-"""The chain as a whole: the slow truth of motion and prefix inside symbols, and laws of what a
-scene names.
+"""The chain as a whole: a slow truth within symbols, and laws of what a scene names.
+
+The truth has motion and prefix inside symbols.
 """
 
 from dataclasses import replace
@@ -132,8 +133,9 @@ def test_other_stations_are_heard_from_mast_to_mast_and_leak_by_their_levels():
 
 @pytest.mark.parametrize(("model", "beside"), [(3, "next waveform"), (9, "previous waveform")])
 def test_another_station_is_heard_by_its_own_clock_and_oscillator(model, beside):
-    """Every time sample from what its sender has on the air by then: the symbol, the one before or
-    the one after.
+    """Every time sample from what its sender has on the air by then.
+
+    That is the symbol, the one before or the one after.
     """
     shared = replace(B, frequency_hz=A.frequency_hz)
     radio, (cloud, row) = (
@@ -187,8 +189,9 @@ def test_on_a_link_every_path_out_meets_every_path_back():
 
 
 def test_on_a_link_the_change_of_the_direct_path_shows_the_direct_paths_side():
-    """What a building takes from the direct path is weighted as the direct path, so that a blocked
-    one is silent.
+    """What a building takes from the direct path is weighted as that path.
+
+    So a blocked one is silent.
     """
     view = link_of({"walls": FACADES}).view
     change = ImagePath(view.places, -1.0, None, ImagePath(view.places, 0.0))
@@ -277,8 +280,9 @@ def test_a_sample_without_its_target_keeps_its_noise_and_land(noise):
 
 
 def test_noise_at_an_snr_of_zero_has_a_stream_of_its_own():
-    """A level of 0 dB is a level: its draws are those neither of 3 dB nor of an effect without a
-    level.
+    """A level of 0 dB is a level.
+
+    Its draws are those neither of 3 dB nor of an effect without a level.
     """
     row = {"subtype": "a", "model": 0}
     asked = scene({"cell_noise": {"snr_db": 0.0}}, network())

@@ -1,5 +1,6 @@
-"""Effects of the channel on the target's own echo, its further paths and what else is heard: laws
-and slow sums.
+"""Effects of the channel: laws and slow sums.
+
+They act on the target's own echo, on its further paths and on what else is heard.
 """
 
 from collections import Counter
@@ -470,8 +471,9 @@ def test_both_directions_of_a_link_share_the_drawn_cross_section_and_stations_do
     ids=["vehicle", "large craft"],
 )
 def test_the_loss_by_the_bistatic_angle_is_that_worked_by_hand(faces, k1, k2):
-    """TR 38.901: 3 sin(beta / 2), and k1 sin(k2 beta / 2) - 5 lg cos(beta / 2) of targets with
-    faces.
+    """The loss of TR 38.901 is 3 sin(beta / 2), or that of a target with faces.
+
+    The latter is k1 sin(k2 beta / 2) - 5 lg cos(beta / 2).
     """
     angle = np.radians([0.0, 60.0, 120.0])
     half = np.array([0.0, 30.0, 60.0])

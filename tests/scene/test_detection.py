@@ -1,6 +1,4 @@
-"""Cancellers and the detector: what they leave of land, of targets and of noise, and where a track
-goes.
-"""
+"""Cancellers and the detector: what they leave of echoes and noise, and where a track goes."""
 
 import numpy as np
 import pytest
@@ -40,8 +38,9 @@ def test_a_canceller_leaves_nothing_of_what_stands_still_and_keeps_the_level_of_
 
 
 def loss_db(changes, speed_mps):
-    """By how much a filter weakens a steady echo of this radial speed, the median over the look's
-    symbols.
+    """By how much a filter weakens a steady echo of this radial speed.
+
+    It is the median over the look's symbols.
     """
     turns = 2 * speed_mps * 4.9e9 / 299_792_458.0 * 2.5e-3
     left = filtered(changes, np.exp(2j * np.pi * turns * np.arange(200))[:, None])
@@ -60,8 +59,9 @@ def test_a_pulse_canceller_weakens_a_steady_echo_as_its_response_says(order):
 
 
 def land(wind_mps, rng, radio=RADIO):
-    """Windblown land of unit power (N, 400): a still part, and lines of an exponential spectrum,
-    drawn one by one.
+    """Windblown land of unit power (N, 400).
+
+    It is a still part and lines of an exponential spectrum, drawn one by one.
     """
     still, beta = windblown(wind_mps, radio.carrier_hz)
     wavelength_m = 299_792_458.0 / radio.carrier_hz
@@ -145,8 +145,9 @@ def chosen(changes, cells, cell=20.0, seed=1):
 
 
 def crossing(cells_a_symbol=0.02, level=30.0):
-    """Range cells (200, 64) of noise, a target that moves from cell 20 on, and a louder echo that
-    stands at 40.
+    """Range cells (200, 64) of noise, a target that moves from cell 20 on, and a louder echo.
+
+    The latter stands at 40.
     """
     place = 20 + cells_a_symbol * np.arange(200)
     cells = normals(5, 200, 64)

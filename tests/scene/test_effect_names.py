@@ -1,5 +1,6 @@
-"""An effect is one file: nothing else names it but the order of all effects, its entry in the
-schema, its tests and the documents.
+"""An effect is one file, and little else names it.
+
+What does are the order of all effects, its entry in the schema, its tests and the documents.
 """
 
 import re

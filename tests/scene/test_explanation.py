@@ -1,5 +1,6 @@
-"""What a scene does to a sample, as `lowalt explain` says it: whose samples they are, and laws of
-what is found.
+"""What a scene does to a sample, as `lowalt explain` says it.
+
+Tested are whose samples they are, and laws of what is found.
 """
 
 from dataclasses import replace
@@ -86,8 +87,9 @@ def test_a_change_beyond_the_signal_is_a_range_over_the_classes_and_no_share(nam
 
 
 def test_a_comb_changes_no_range_cell_of_a_near_target_and_its_ratio_is_that_of_each_class():
-    """Its cells are those of the whole band modulo their number, where the target stands in one
-    cell.
+    """Its cells are those of the whole band modulo their number.
+
+    There the target stands in one cell.
     """
     config = configuration()
     config["targets"]["select"] = ["DJI Mini 2", "Owl"]
@@ -125,8 +127,9 @@ def test_a_finding_says_how_fast_the_range_grows():
 
 
 def test_the_cell_beside_the_target_holds_it_at_the_end_of_ranges_too():
-    """An error of one cell to either side, where the target stands in cell 0: 32 cells of 39 m
-    farther.
+    """An error of one cell to either side is right at the end of ranges too.
+
+    The target then stands in cell 0, 32 cells of 39 m farther.
     """
     always = {"cell_error": {"probability": 1.0, "spread_cells": 1}}
     assert (

@@ -1,5 +1,6 @@
-"""FMCW and continuous-wave radars: sums over every sample at its own time, and laws of range, noise
-and receiver.
+"""FMCW and continuous-wave radars: sums over every sample at its own time, and laws.
+
+The laws are of range, noise and receiver.
 """
 
 import numpy as np
@@ -82,8 +83,9 @@ def test_a_target_that_moves_reads_its_doppler_frequency_times_the_sweep_in_rang
 
 
 def test_noise_is_that_of_the_energy_of_a_sweep_or_of_a_sample_of_a_continuous_wave():
-    """A matched filter's signal over noise is E / (k T F): transmit power times the time of a
-    sweep.
+    """A matched filter's signal over noise is E / (k T F).
+
+    The energy E is the transmit power times the time of a sweep.
     """
     density = 1.380649e-23 * 290 * 10**0.7
     for waveform, time_s in ((SWEEP, 400e-6), ({"kind": "cw"}, 0.5e-3)):

@@ -1,5 +1,6 @@
-"""Land: its power by closed forms and sums over a fine grid, its amplitude laws, its Doppler and
-its side lobes.
+"""Land: its power, its amplitude laws, its Doppler and its side lobes.
+
+Its power is tested by closed forms and sums over a fine grid.
 """
 
 from dataclasses import replace
@@ -148,8 +149,9 @@ def test_windblown_land_has_billingsleys_spectrum_and_ratio(slow):
 
 
 def test_neighbouring_cells_of_land_are_alike_over_the_correlation_length():
-    """Cells are 78 m long, so that a length of 1 km makes neighbours alike; side lobes always do a
-    little.
+    """Cells are 78 m long, so a length of 1 km makes neighbours alike.
+
+    Side lobes always do a little.
     """
     radio = network(subcarriers=16, symbols=2)
     aim = AIMS[0]

@@ -1,5 +1,6 @@
-"""Effects on motion: laws of the processes that move rotors and flying targets, read back out of
-what they draw.
+"""Effects on motion: laws read back out of what they draw.
+
+Their processes move rotors and flying targets.
 """
 
 from dataclasses import replace
@@ -116,8 +117,9 @@ def test_what_stands_on_the_ground_is_not_moved(clouds):
 
 
 def test_turbulence_and_wind_are_those_of_the_standard():
-    """MIL-F-8785C, 3.7: at 1000 ft lengths of 1000 ft and equal intensities; at 20 ft the wind
-    itself.
+    """Lengths and intensities of MIL-F-8785C, 3.7.
+
+    At 1000 ft lengths are 1000 ft and intensities equal; at 20 ft the wind itself counts.
     """
     scales, intensities = gusts.turbulence(304.8, 10.0)
     np.testing.assert_allclose(scales, 304.8, rtol=1e-9)

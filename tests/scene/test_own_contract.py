@@ -1,5 +1,7 @@
-"""An effect of the user's own offers all that a shipped one can: it reads a file, needs surfaces and
-clouds, adds to the record, breaks tracks, and filters what noise passes.
+"""An effect of the user's own offers all that a shipped one can.
+
+It reads a file, needs surfaces and clouds, adds to the record, breaks tracks, and filters what
+noise passes.
 """
 
 import json

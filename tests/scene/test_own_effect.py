@@ -1,5 +1,6 @@
-"""A user's own effect acts in its place with its settings, an overlay alone may name it, and edits
-re-run its jobs.
+"""A user's own effect acts in its place with its settings.
+
+An overlay alone may name it, and edits re-run its jobs.
 """
 
 import shutil

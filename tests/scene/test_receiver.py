@@ -225,8 +225,9 @@ def test_phase_from_symbol_to_symbol_wanders_as_its_spectrum_says():
 
 
 def test_the_slowest_lines_of_a_free_oscillator_wander_over_a_look_as_they_stand():
-    """Each line k of amplitude a turns by exp(2 pi j f_k t): D(t) = sum of a^2 (2 - 2 cos 2 pi f_k
-    t).
+    """Each line k of amplitude a turns by exp(2 pi j f_k t).
+
+    So D(t) is the sum of a^2 (2 - 2 cos 2 pi f_k t).
     """
     settings = phase_noise.DEFAULTS | {"shared": False, "loop_hz": 0.0}
     radio = network(symbols=400)
@@ -270,8 +271,9 @@ def test_one_oscillator_leaves_little_noise_on_near_echoes():
 
 
 def test_the_default_spectrum_is_that_of_the_3gpp_model():
-    """TR 38.803, Table 6.1.10-1 (29.55 GHz): level, zeros and poles (Hz) with their powers; 20
-    log10 to 4.9 GHz.
+    """The oscillator of TR 38.803, Table 6.1.10-1 (29.55 GHz), moved to 4.9 GHz by 20 log10.
+
+    It has a level, and zeros and poles (Hz) with their powers.
     """
     f = np.geomspace(1, 15e6, 2000)
     level = 32 + 20 * np.log10(4.9 / 29.55)

@@ -1,5 +1,6 @@
-"""Scenes that are refused before any job starts, each by the effect and what was expected; and the
-schema's keys.
+"""Scenes that are refused before any job starts, and the schema's keys.
+
+A refusal says the effect and what was expected.
 """
 
 import importlib

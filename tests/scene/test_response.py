@@ -1,5 +1,6 @@
-"""The frequency response against sums over every element, path and subcarrier, and by laws of
-reciprocity.
+"""The frequency response against sums over every element, path and subcarrier.
+
+It is also tested by laws of reciprocity.
 """
 
 from dataclasses import replace

@@ -1,5 +1,6 @@
-"""Shadows: every ray against every triangle and bone, one by one, and closed forms of simple bodies
-and blades.
+"""Shadows: every ray against every triangle and bone, one by one.
+
+They are also tested by closed forms of simple bodies and blades.
 """
 
 from dataclasses import replace
@@ -50,8 +51,9 @@ def among_triangles(closed: bool, station=A, points: int = 60, count: int = 80, 
 
 
 def one_by_one(view: View, parts) -> np.ndarray:
-    """Whether triangles of `parts` hide each point (N, L): each plane is crossed, and the corners
-    hold the crossing.
+    """Whether triangles of `parts` hide each point (N, L).
+
+    Each plane is crossed, and the corners hold the crossing.
     """
     held, (rotation, translation, points, part) = view.occluders, view.motion
     place = np.array(view.station.position_m)

@@ -1,5 +1,6 @@
-"""The surroundings' echoes: path losses by hand, the tables' moments, powers and delays of rays,
-and their sum.
+"""The surroundings' echoes: path losses by hand, the tables' moments, rays and their sum.
+
+Of rays, powers and delays are tested.
 """
 
 from dataclasses import replace
@@ -24,7 +25,7 @@ USUAL = Large(1e-7, 12.0, 2.0, 0.0)
 def test_reference_points_have_the_tables_moments_and_are_a_third_of_a_turn_apart(environment):
     rng = np.random.default_rng(1)
     points = np.array([background_channel.reference_points(environment, rng) for _ in range(3000)])
-    for column, (shape, rate, offset) in enumerate(background_channel.PLACES[environment]):
+    for column, (shape, rate, offset) in enumerate(background_channel.POSITION_LAWS[environment]):
         error = np.sqrt(shape) / rate / np.sqrt(9000)
         assert points[:, :, column].mean() == pytest.approx(shape / rate + offset, abs=4 * error)
     np.testing.assert_allclose(np.diff(points[:, :, 2], axis=1), 2 * np.pi / 3)

@@ -1,6 +1,4 @@
-"""What a station sends, and when: data, amplifier, combs of pilots, and symbols that are late or
-missing.
-"""
+"""What a station sends, and when: data, amplifier, combs of pilots, late or missing symbols."""
 
 import numpy as np
 import pytest
@@ -34,9 +32,7 @@ def test_an_amplifier_leaves_a_smaller_copy_of_the_data_and_distortion_as_bussga
     aired = power_amplifier.aired({"backoff_db": 3.0}, sent)
 
     def mean(of):
-        """Mean over a Gaussian signal of a function of a sample's power and of the power that comes
-        out.
-        """
+        """Mean over a Gaussian signal of a function of a sample's power and of what comes out."""
         return quad(lambda u: of(u, u / np.sqrt(1 + (u / 10**0.3) ** 2)) * np.exp(-u), 0, 60)[0]
 
     gain = mean(lambda u, out: np.sqrt(u * out))

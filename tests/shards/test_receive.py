@@ -306,6 +306,11 @@ def test_a_layer_that_is_changed_in_place_is_another_configuration():
     assert (lowalt.receive(layer, CAR, 1).values == first.values).all()
 
 
+def test_no_layers_at_all_are_the_embedded_default():
+    network = kept_datasets.alone([], CAR).maker.network
+    assert network == Network.from_settings(overlaid([])["network"])
+
+
 def test_wrong_words_are_refused(plain):
     with pytest.raises(
         InputError, match=r"at is 'range', expected one of \['subcarriers', 'receiver'"

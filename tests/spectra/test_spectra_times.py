@@ -1,5 +1,6 @@
-"""Spectra at the instants of received symbols: fits by hand, exact lines, and today's bits where
-sampling is even.
+"""Spectra at the instants of received symbols: fits by hand and exact lines.
+
+Where sampling is even, they have today's bits.
 """
 
 import numpy as np
@@ -35,8 +36,9 @@ def known(name, signal, late):
 
 
 def fitted(signal, present, times, turns, first, count):
-    """Amplitude of the line of one frequency that fits the received symbols of one window, by the
-    normal equations.
+    """Amplitude of the line of one frequency that fits the received symbols of one window.
+
+    It is found by the normal equations.
     """
     at = [n for n in range(first, first + count) if present[n]]
     if not at:

@@ -1,5 +1,6 @@
-"""The instants of late symbols travel: all kinds of shards and the tiles stage give the tiles of
-the made sample.
+"""The instants of late symbols travel with the samples.
+
+All kinds of shards and the tiles stage give the tiles of the made sample.
 """
 
 import json

@@ -1,5 +1,6 @@
-"""The cloud file: what is written is read back bit by bit, and what breaks the contract is refused
-by name.
+"""The cloud file: what is written is read back bit by bit.
+
+What breaks the contract is refused by name.
 """
 
 import dataclasses

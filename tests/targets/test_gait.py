@@ -1,5 +1,6 @@
-"""The built-in pedestrians: what the published model says, rigid bones, a seamless cycle, people
-who differ.
+"""The built-in pedestrians: what the published model says, rigid bones, a seamless cycle.
+
+People differ.
 """
 
 from pathlib import Path

@@ -1,5 +1,6 @@
-"""Targets of drawn sizes, and other runs' samples in a training: laws of scaling, and what is
-refused.
+"""Targets of drawn sizes, and other runs' samples in a training.
+
+Tested are laws of scaling, and what is refused.
 """
 
 import json

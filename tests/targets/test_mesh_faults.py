@@ -1,5 +1,6 @@
-"""Users' meshes that cannot be read or used: each is refused by file, key and reason; order means
-nothing.
+"""Users' meshes that cannot be read or used are refused by file, key and reason.
+
+Order means nothing.
 """
 
 import json
@@ -146,8 +147,9 @@ print(len(cloud.points), int(re.search(r"VmHWM:\\s+(\\d+) kB", Path("/proc/self/
     "names", [("front right", "body"), ("arm 1", "zebra"), ("back left wheel", "Aaa"), ("1", "0")]
 )
 def test_the_order_and_the_names_of_parts_mean_nothing(names, quad):
-    """Settings reach a job with sorted keys, so a record must give the same cloud however its parts
-    are sorted.
+    """A record gives the same cloud however its parts are sorted.
+
+    Settings reach a job with sorted keys.
     """
     first, body = names
     record = quad_record()
@@ -223,8 +225,9 @@ def test_parts_that_contradict_one_another_are_refused_whatever_their_order(
 
 
 def wheeled(tmp_path, axis=0, centre=0.33, count=4, turns=None) -> dict:
-    """Write a car with separate wheels whose thin direction is `axis`, and return its record;
-    turns: the last axle.
+    """Write a car with separate wheels whose thin direction is `axis`, and return its record.
+
+    turns: of the last axle.
     """
     box((1.8, 4.5, 1.0), (0, 0, 0.9)).export(tmp_path / "car.obj")
     turn = trimesh.transformations.rotation_matrix(np.pi / 2, [0, 1, 0] if axis == 0 else [1, 0, 0])

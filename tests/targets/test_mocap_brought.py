@@ -1,5 +1,6 @@
-"""Recordings as people have them: other rates, cuts and marks of AMC files, BVH, arrays of joints,
-CMU's clips.
+"""Recordings as people have them: BVH, arrays of joints, CMU's clips.
+
+AMC files come with other rates, cuts and marks.
 """
 
 from itertools import pairwise
@@ -90,8 +91,9 @@ def test_a_long_recording_of_which_a_few_frames_are_used_says_which(files):
 
 
 def joints_of(track: np.ndarray, names: dict[str, str]) -> np.ndarray:
-    """Joint positions (F, J, 3) in SMPL's order from nodes (F, 31, 3), spine and collars on
-    straight lines.
+    """Joint positions (F, J, 3) in SMPL's order from nodes (F, 31, 3).
+
+    Spine and collars lie on straight lines.
     """
     at = {name: track[:, NODES.index(node)] for name, node in names.items()}
     spine = at["neck"] - at["pelvis"]

@@ -1,5 +1,6 @@
-"""Cycles of recordings: found, closed without a jump, turned to the front, and refused where they
-close badly.
+"""Cycles of recordings: found, closed without a jump, and turned to the front.
+
+They are refused where they close badly.
 """
 
 import tracemalloc

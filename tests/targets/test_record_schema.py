@@ -1,5 +1,6 @@
-"""The schema of records: it knows the keys that the code knows, describes each, and the page of
-keys shows them.
+"""The schema of records: it knows the keys that the code knows and describes each.
+
+The page of keys shows them.
 """
 
 import pytest

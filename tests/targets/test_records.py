@@ -1,5 +1,6 @@
-"""Records: what is merged and overrides what, rows of one's own, and faults refused by file,
-subtype, key and value.
+"""Records: what is merged and overrides what, rows of one's own, and faults refused.
+
+A fault is refused by file, subtype, key and value.
 """
 
 import copy

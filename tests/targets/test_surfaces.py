@@ -1,5 +1,6 @@
-"""Primitive surfaces: closed, outward, of the volume geometry says; and points on them: exact
-counts, areas, even.
+"""Primitive surfaces: closed, outward, of the volume geometry says; and points on them.
+
+Points have exact counts, areas, and are even.
 """
 
 import itertools

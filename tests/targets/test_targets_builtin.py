@@ -1,5 +1,6 @@
-"""The built-in models: published sizes, exact counts, closed surfaces, and parts that turn the
-right way.
+"""The built-in models: published sizes, exact counts and closed surfaces.
+
+Parts turn the right way.
 """
 
 import hashlib

@@ -1,5 +1,6 @@
-"""Targets beyond the published forty: their records alone add them, and they move as their kind
-does.
+"""Targets beyond the published forty: their records alone add them.
+
+They move as their kind does.
 """
 
 import hashlib
@@ -71,8 +72,9 @@ def test_each_is_as_large_as_its_row_says_and_the_forty_stay_as_they_are(clouds)
 
 
 def test_clouds_are_the_kept_ones_to_the_byte(tmp_path, clouds):
-    """Each length, angle and count of the ten models; where a change is wanted, the sums found here
-    are kept.
+    """Each length, angle and count of the ten models.
+
+    Where a change is wanted, the sums found here are kept.
     """
     for name, cloud in clouds.items():
         write(tmp_path / f"{slug(name)}.npz", cloud)

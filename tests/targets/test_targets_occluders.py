@@ -1,5 +1,6 @@
-"""Opaque surfaces of targets: divided triangles, pieces cut away, capsules along bones, and the
-files of them.
+"""Opaque surfaces of targets, and the files of them.
+
+These are divided triangles, pieces cut away, and capsules along bones.
 """
 
 import json

@@ -1,5 +1,6 @@
-"""Cubes: their range cells against the echo's definition, their noise, their truth, and the images
-made of them.
+"""Cubes: their range cells, noise and truth, and the images made of them.
+
+Range cells are tested against the echo's definition.
 """
 
 import io

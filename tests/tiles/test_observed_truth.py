@@ -1,5 +1,6 @@
-"""The observed truth: where echoes appear in range cells and speeds, in all scenes, read back out
-of the cubes.
+"""The observed truth: where echoes appear in range cells and speeds, in all scenes.
+
+It is read back out of the cubes.
 """
 
 import sys

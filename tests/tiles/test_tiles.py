@@ -1,6 +1,4 @@
-"""Images of spectra: the resampling kernel, the scales, the fused renderer, PNG and the command
-line.
-"""
+"""Images of spectra: the resampling kernel, the scales, the fused renderer, PNG, commands."""
 
 import json
 import zipfile
@@ -75,9 +73,7 @@ def test_index_is_the_formula(scale, signed):
 @pytest.mark.parametrize("scale", [*SCALES, Scale("power", gamma=2.0), Scale("decibel", 140.0)])
 @pytest.mark.parametrize("levels", [127, 255])
 def test_lookup_counts_thresholds_exactly(scale, levels):
-    """On both sides of every threshold and on many values between, the tables give the count
-    itself.
-    """
+    """On both sides of every threshold and between, the tables give the count itself."""
     table = lookup(scale, levels)
     thresholds = scale.thresholds(levels).astype(np.float32)
     edges = [
@@ -230,8 +226,9 @@ def test_refusals_name_what_is_wrong():
 
 
 def test_pixels_of_a_signal_are_fixed():
-    """The renderer's pixels are a promise: equal on every machine and with every version of every
-    library.
+    """The renderer's pixels are a promise.
+
+    They are equal on every machine and with every version of every library.
     """
     steps = np.arange(1200, dtype=np.int64).reshape(3, 400)
     signals = ((steps**3 % 257 - 128) + 1j * (steps**2 % 251 - 125)).astype(np.complex64)

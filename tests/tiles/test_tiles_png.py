@@ -68,8 +68,9 @@ def test_code_lengths_are_a_code_as_short_as_can_be(counts, longest):
 
 
 def test_match_lengths_are_those_of_the_format():
-    """RFC 1951's table by its corners: 257 is 3, 265 starts at 11 with one extra bit, 284 ends at
-    257, 285 is 258.
+    """The table of RFC 1951 by its corners.
+
+    257 is 3, 265 starts at 11 with one extra bit, 284 ends at 257, 285 is 258.
     """
     assert [MATCH_SYMBOL[n] for n in (3, 10, 11, 12, 13, 18, 19, 257, 258)] == [
         257, 264, 265, 265, 266, 268, 269, 284, 285,
@@ -119,8 +120,9 @@ def test_damaged_or_other_images_are_refused():
 
 
 def test_bytes_of_an_image_are_fixed():
-    """The encoder's bytes are a promise: equal on every machine and with every version of every
-    library.
+    """The encoder's bytes are a promise.
+
+    They are equal on every machine and with every version of every library.
     """
     image = (np.add.outer(np.arange(64) ** 2, 3 * np.arange(96)) // 7 % 256).astype(np.uint8)
     image[20:40] = 9

@@ -7,12 +7,14 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
 import snakemake_runs
+from lowalt.files.processes import lives
 from lowalt.workflow import mends
 from lowalt.workflow.locks import TOKEN, Owner, numbers, take
 
@@ -56,6 +58,42 @@ def test_the_lock_of_a_killed_run_stays_in_plain_snakemake(tmp_path):
     killed, _ = snakemake_runs.run(tmp_path, ["--cores", "1"], os.environ)
     status, text = snakemake_runs.run(tmp_path, ["--cores", "1", "--rerun-incomplete"], os.environ)
     assert killed == -signal.SIGKILL and status == 1 and "Directory cannot be locked" in text
+
+
+JOB = """
+import os, time
+from pathlib import Path
+from lowalt.machine.run_pipe import end_with_starter
+end_with_starter()
+Path("job.pid").write_text(str(os.getpid()))
+time.sleep(60)
+"""
+KILLED_WITH_A_JOB = """
+{mend}
+rule all:
+    output: "out"
+    shell: "python job.py & while [ ! -s job.pid ]; do sleep 0.02; done; kill -9 $PPID; wait"
+"""
+
+
+@pytest.mark.parametrize("mended", [False, True])
+def test_a_job_outlives_a_killed_run_of_plain_snakemake_and_ends_with_a_mended_one(
+    mended, tmp_path
+):
+    mend = "from lowalt.workflow import mends; mends.end_jobs()" if mended else ""
+    (tmp_path / "Snakefile").write_text(KILLED_WITH_A_JOB.format(mend=mend))
+    (tmp_path / "job.py").write_text(JOB)
+    path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
+    environment = os.environ | {"PYTHONPATH": str(SOURCE), "PATH": path}
+    killed, text = snakemake_runs.run(tmp_path, ["--cores", "1"], environment)
+    assert killed == -signal.SIGKILL, text
+    job = int((tmp_path / "job.pid").read_text())
+    stop = time.monotonic() + (10 if mended else 0.3)
+    while lives(job) and time.monotonic() < stop:
+        time.sleep(0.02)
+    assert lives(job) is not mended
+    if not mended:
+        os.kill(job, signal.SIGKILL)
 
 
 def test_the_mended_lock_has_an_owner_for_the_length_of_its_block(kept, monkeypatch, capsys):

@@ -1,3 +1,1 @@
-"""The commands of `lowalt COMMAND`. They call the stages and print results; nothing is computed
-here.
-"""
+"""The commands of `lowalt COMMAND`, which call the stages and print what these return."""

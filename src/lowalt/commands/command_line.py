@@ -1,4 +1,4 @@
-"""Common parts of all commands: their parser entry, and their answer as text or JSON."""
+"""What all commands share: their entry in the parser, and their answer as text or JSON."""
 
 import argparse
 import dataclasses
@@ -14,7 +14,7 @@ from lowalt.commands.command_table import COMMANDS
 
 
 class Answer(NamedTuple):
-    """The answer of a command: `facts` as JSON for programs, `text` for users, and the exit status."""
+    """The answer of a command: `facts` as JSON for programs, `text` for users, exit status."""
 
     facts: object
     text: str
@@ -42,8 +42,9 @@ def add_command(
 
 
 def positive(limit: float, expected: str) -> Callable[[str], float]:
-    """Return the type of an option: a number between 0 and a limit; expected: what a refusal asks
-    for.
+    """Return the type of an option that is a number between 0 and a limit.
+
+    expected: what the refusal of another text asks for.
     """
 
     def number(text: str) -> float:
@@ -69,9 +70,13 @@ def _plain(value: object) -> object:
         return {str(key): _plain(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
         return [_plain(item) for item in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None if math.isnan(value) else "inf" if value > 0 else "-inf"
-    return str(value) if isinstance(value, Path) else value
+    if isinstance(value, Path):
+        return str(value)
+    if isinstance(value, float) and math.isnan(value):
+        return None
+    if isinstance(value, float) and math.isinf(value):
+        return str(value)
+    return value
 
 
 def as_json(facts: object) -> str:

@@ -1,10 +1,9 @@
-"""The command `lowalt compare`: two finished runs side by side, or two methods of the benchmark's
-table.
-"""
+"""The command `lowalt compare`: two finished runs, or two methods of the benchmark's table."""
 
 import argparse
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 from lowalt.commands.command_line import Answer, add_command
 from lowalt.config.extensions import function_offered, offered
@@ -21,14 +20,13 @@ MEASURED = ("accuracy_percent", "processor_s", "data")
 def add_to(commands: argparse._SubParsersAction, name: str) -> None:
     """Add `compare` to a parser's commands."""
     line = add_command(commands, name, run)
-    about = "folder of a finished run, or a method of the benchmark's table, such as 'RBF-SVM on features'"
+    about = "folder of a finished run, or a method of the benchmark's table, such as "
+    about += "'RBF-SVM on features'"
     line.add_argument("runs", type=Path, nargs=2, metavar="RUN", help=about)
 
 
 def leaves(block: dict, where: str = "") -> Iterator[tuple[str, object]]:
-    """Yield (dotted key, value) for all values in nested mappings that are not mappings or are
-    empty.
-    """
+    """Yield (dotted key, value) for all values of nested mappings, empty mappings among them."""
     for key, value in block.items():
         if isinstance(value, dict) and value:
             yield from leaves(value, f"{where}{key}.")
@@ -37,63 +35,65 @@ def leaves(block: dict, where: str = "") -> Iterator[tuple[str, object]]:
 
 
 def facts(folder: Path) -> dict[str, dict]:
-    """Return the facts of one run's folder, {part: {name: value}}.
+    """Return the facts of one run's folder, {section: {name: value}}.
 
-    Parts: configuration (dotted keys), accuracy_percent (averages over the SNRs by "protocol
-    scheme"), processor_s (by stage), data (samples and bytes); a part is empty where the run has no
-    such table.
+    Sections: configuration (dotted keys), accuracy_percent (averages over the SNRs by "protocol
+    scheme"), processor_s (by stage), data (samples and bytes); a section is empty where the run
+    has no such table.
     Raises: InputError naming the folder that is no run's, or the file in it that is damaged.
     """
-    config = of_run(folder)
-    accuracy, stages, index = (
-        folder / name for name in ("accuracy.csv", "stages.csv", "shards/index.json")
-    )
-    shares = averages(accuracy) if accuracy.exists() else {}
-    times = read_csv(stages, "rule", "cpu_s") if stages.exists() else []
-    data = read_object(index, "an index of shards") if index.exists() else {}
+    result: dict[str, dict] = {"configuration": dict(leaves(of_run(folder)))}
+    result |= {section: {} for section in MEASURED}
+    accuracy = folder / "accuracy.csv"
+    if accuracy.exists():
+        for (scheme, protocol), share in averages(accuracy).items():
+            result["accuracy_percent"][f"{protocol} {scheme}"] = share
+    stages = folder / "stages.csv"
+    if stages.exists():
+        for row in read_csv(stages, "rule", "cpu_s"):
+            result["processor_s"][row["rule"]] = number(row, "cpu_s", stages)
+    index = folder / "shards/index.json"
     if index.exists():
-        check_brought("sizes", data, index)
-    return {
-        "configuration": dict(leaves(config)),
-        "accuracy_percent": {
-            f"{protocol} {scheme}": share for (scheme, protocol), share in shares.items()
-        },
-        "processor_s": {row["rule"]: number(row, "cpu_s", stages) for row in times},
-        "data": {name: data[name] for name in ("samples", "bytes") if data},
-    }
+        sizes = read_object(index, "an index of shards")
+        check_brought("sizes", sizes, index)
+        result["data"] = {name: sizes[name] for name in ("samples", "bytes")}
+    return result
 
 
 def compared(*folders: Path) -> dict[str, dict[str, tuple]]:
-    """Return {part: {name: (value of the first run, value of the second)}}: only differences of the
-    configuration, and everything in the parts MEASURED. A missing value is None.
+    """Return {section: {name: (value of the first run, value of the second)}} of two runs.
 
-    Raises: InputError naming the folder that is no run's.
+    The configuration has its differences only, the sections MEASURED have everything; a missing
+    value is None. Raises: InputError naming the folder that is no run's.
     """
     first, second = map(facts, folders)
-    pairs = {
-        part: {
-            name: (first[part].get(name), second[part].get(name))
-            for name in {**first[part], **second[part]}
-        }
-        for part in ("configuration", *MEASURED)
-    }
-    pairs["configuration"] = {
-        name: pair for name, pair in pairs["configuration"].items() if pair[0] != pair[1]
-    }
+    pairs: dict[str, dict[str, tuple]] = {}
+    for section in first:
+        pairs[section] = {}
+        for name in first[section] | second[section]:
+            pair = (first[section].get(name), second[section].get(name))
+            if section in MEASURED or pair[0] != pair[1]:
+                pairs[section][name] = pair
     return pairs
 
 
 def _cell(value: object) -> str:
     """A value as text, a number with four digits; a dash for None."""
-    return "-" if value is None else f"{value:.4g}" if isinstance(value, float) else str(value)
+    if value is None:
+        return "-"
+    if isinstance(value, float):
+        return f"{value:.4g}"
+    return str(value)
 
 
-def _change(part: str, first: object, second: object) -> str:
+def _change(section: str, first: Any, second: Any) -> str:
     """The difference of two measured numbers; for times and sizes also relative to the first."""
-    if part not in MEASURED or None in (first, second):
+    if section not in MEASURED or None in (first, second):
         return ""
-    share = f" ({second / first - 1:+.1%})" if part != "accuracy_percent" and first else ""
-    return f"   {second - first:+.4g}{share}"
+    difference = f"   {second - first:+.4g}"
+    if section == "accuracy_percent" or not first:
+        return difference
+    return f"{difference} ({second / first - 1:+.1%})"
 
 
 def others(first: str, second: str) -> Answer:
@@ -116,12 +116,13 @@ def run(options: argparse.Namespace) -> Answer:
         return others(*map(str, options.runs))
     pairs = compared(*options.runs)
     blocks = []
-    for part, rows in pairs.items():
-        wide = max(map(len, rows), default=0)
-        lines = [
-            f"  {name:{wide}}  {_cell(first)} | {_cell(second)}{_change(part, first, second)}"
-            for name, (first, second) in rows.items()
-        ]
-        head = f"{part.replace('_', ' ')}: {options.runs[0]} | {options.runs[1]}"
-        blocks += ["\n".join([head, *lines])] if rows else []
+    for section, rows in pairs.items():
+        if not rows:
+            continue
+        width = max(map(len, rows))
+        lines = [f"{section.replace('_', ' ')}: {options.runs[0]} | {options.runs[1]}"]
+        for name, (first, second) in rows.items():
+            change = _change(section, first, second)
+            lines.append(f"  {name:{width}}  {_cell(first)} | {_cell(second)}{change}")
+        blocks.append("\n".join(lines))
     return Answer(pairs, "\n\n".join(blocks))

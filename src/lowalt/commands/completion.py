@@ -1,9 +1,8 @@
-"""The command `lowalt completion`: a shell script for tab completion of commands, options and
-files.
-"""
+"""The command `lowalt completion`: a shell script that completes commands, options and files."""
 
 import argparse
 from collections.abc import Iterator
+from typing import NamedTuple
 
 from lowalt.commands.command_line import Answer, add_command
 
@@ -41,31 +40,35 @@ def run(_options: argparse.Namespace) -> Answer:
     return Answer({"script": text}, text)
 
 
-def parsers(
-    line: argparse.ArgumentParser, path: str = ""
-) -> Iterator[tuple[str, list[str], list[str]]]:
-    """Yield the words, such as " target make", the options and the names of commands of a parser
-    and all below it.
-    """
-    below = {
-        name: parser
-        for action in line._actions
-        if isinstance(action, argparse._SubParsersAction)
-        for name, parser in action.choices.items()
-    }
-    yield (
-        path,
-        [word for action in line._actions for word in action.option_strings if word[:2] == "--"],
-        [*below],
-    )
-    for name, parser in below.items():
+class Completed(NamedTuple):
+    """What may follow a command: path, its words such as " target make"; names: of its commands."""
+
+    path: str
+    options: list[str]
+    names: list[str]
+
+
+def parsers(line: argparse.ArgumentParser, path: str = "") -> Iterator[Completed]:
+    """Yield what may follow the command of a parser and each command below it."""
+    options = []
+    commands: dict[str, argparse.ArgumentParser] = {}
+    for action in line._actions:
+        options += [word for word in action.option_strings if word.startswith("--")]
+        if isinstance(action, argparse._SubParsersAction):
+            commands |= action.choices
+    yield Completed(path, options, list(commands))
+    for name, parser in commands.items():
         yield from parsers(parser, f"{path} {name}")
 
 
 def script(line: argparse.ArgumentParser) -> str:
     """Return the script that completes the commands of a parser."""
-    rows = [(path, " ".join(options), " ".join(names)) for path, options, names in parsers(line)]
-    cases = "\n".join(
-        f'    "{path}") options="{options}"; names="{names}";;' for path, options, names in rows
-    )
-    return SCRIPT.format(paths=" | ".join(f'"{path}"' for path, _, _ in rows if path), cases=cases)
+    paths = []
+    cases = []
+    for row in parsers(line):
+        options = " ".join(row.options)
+        names = " ".join(row.names)
+        cases.append(f'    "{row.path}") options="{options}"; names="{names}";;')
+        if row.path:
+            paths.append(f'"{row.path}"')
+    return SCRIPT.format(paths=" | ".join(paths), cases="\n".join(cases))

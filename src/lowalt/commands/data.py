@@ -9,11 +9,13 @@ from lowalt.shards.verify import faults, frozen
 
 def add_to(commands: argparse._SubParsersAction, name: str) -> None:
     """Add `verify` or `remake` to a parser's commands."""
-    line = add_command(commands, name, verified if name == "verify" else remade)
     if name == "verify":
+        line = add_command(commands, name, verified)
         line.add_argument(
             "--remake", type=int, default=0, metavar="N", help="also make N random samples again"
         )
+    else:
+        line = add_command(commands, name, remade)
     line.add_argument("index", type=_index, help="index.json of the data set")
     line.add_argument("--clouds", type=Path, help="folder of the run's clouds (default: ../clouds)")
     line.add_argument(
@@ -29,42 +31,45 @@ def _checked(lines: list[str], good: str) -> Answer:
 
 
 def _index(text: str) -> Path:
-    """The index that a command line names; a link to the index alone is resolved, to find the
-    shards next to it.
+    """The index that a command line names.
+
+    A link to the index alone is resolved, to find the shards next to the file.
     """
-    return Path(text).resolve() if Path(text).is_symlink() else Path(text)
+    path = Path(text)
+    if path.is_symlink():
+        return path.resolve()
+    return path
 
 
 def verified(options: argparse.Namespace) -> Answer:
-    """Check a data set and, if it has no fault, remake samples. Raises: InputError where there is
-    no index.
+    """Check a data set and, if it has no fault, remake samples.
+
+    Raises: InputError where there is no index.
     """
     from lowalt.shards.remake import opened, some
 
     lines = list(faults(options.index))
     if options.remake and not lines:
         remaker = opened(options.index, options.clouds, options.occluders)
-        lines = [
-            line
-            for number in some(remaker.shards, options.remake)
-            for line in remaker.faults(number)
-        ]
-    again = f", {options.remake} samples made again" if options.remake else ""
+        for number in some(remaker.shards, options.remake):
+            lines += remaker.faults(number)
+    good = f"{options.index}: every byte is as it was written, "
     count = len(frozen(options.index))
-    clouds = (
-        f"also of {count} clouds and motion tables"
-        if count
-        else "clouds and motion tables have no checksums here"
-    )
-    return _checked(lines, f"{options.index}: every byte is as it was written, {clouds}{again}")
+    if count:
+        good += f"also of {count} clouds and motion tables"
+    else:
+        good += "clouds and motion tables have no checksums here"
+    if options.remake:
+        good += f", {options.remake} samples made again"
+    return _checked(lines, good)
 
 
 def remade(options: argparse.Namespace) -> Answer:
     """Make samples again and compare them. Raises: InputError for a key that the data set lacks."""
-    from lowalt.shards.remake import opened, place_of
+    from lowalt.shards.remake import number_of, opened
 
     remaker = opened(options.index, options.clouds, options.occluders)
-    lines = [
-        line for key in options.sample for line in remaker.faults(place_of(remaker.shards, key))
-    ]
+    lines = []
+    for key in options.sample:
+        lines += remaker.faults(number_of(remaker.shards, key))
     return _checked(lines, f"{len(options.sample)} samples made again, equal in every byte")

@@ -1,6 +1,4 @@
-"""The command `lowalt explain` says whether a scene's receiver finds its targets, and what each
-effect changes.
-"""
+"""The command `lowalt explain`: whether a scene's receiver finds its targets, and why."""
 
 import argparse
 import dataclasses
@@ -70,15 +68,15 @@ def run(options: argparse.Namespace) -> Answer:
 
     Raises: InputError where the configuration, a sample or a station is wrong.
     """
-    if (options.suggest is None) != (options.out is None):
-        raise InputError(
-            "--suggest: without --out, expected both"
-            if options.out is None
-            else "--out: expected --suggest"
-        )
+    if options.suggest is not None and options.out is None:
+        raise InputError("--suggest: without --out, expected both")
+    if options.out is not None and options.suggest is None:
+        raise InputError("--out: expected --suggest")
     from lowalt.scene import explanation
 
-    inputs = Path(os.environ["LOWALT_INPUTS"]) if os.environ.get("LOWALT_INPUTS") else None
+    inputs = None
+    if os.environ.get("LOWALT_INPUTS"):
+        inputs = Path(os.environ["LOWALT_INPUTS"])
     config = overlaid(options.scene)
     size = _size(config, inputs)
     scene = explanation.scene_of(config)
@@ -100,7 +98,9 @@ def run(options: argparse.Namespace) -> Answer:
     changes = []
     if not options.no_table or options.suggest is not None:
         print("lowalt explain: leaving out and adding every effect", file=sys.stderr, flush=True)
-        names = [station.name for station in stations] if options.model else [first]
+        names = [first]
+        if options.model:
+            names = [station.name for station in stations]
         with announced("lowalt explain: leaving out and adding every effect"):
             changes = explanation.changes(
                 config, chosen, names, _shown(config, names, options.model)
@@ -110,36 +110,44 @@ def run(options: argparse.Namespace) -> Answer:
         for path in options.scene:
             overlay = merge(overlay, load_yaml(path))
         write_file(options.out, explanation.suggested(overlay, changes, options.suggest))
-    lines = [*([cubes_sentence(size), ""] if size else []), *explanation.verdict(findings)]
+    return _answer(options, config["run"], size, findings, changes)
+
+
+def _answer(
+    options: argparse.Namespace, name: str, size: dict, findings: list, changes: list
+) -> Answer:
+    """The answer on the run `name`: size of its cubes, verdict, table of effects and levels."""
+    from lowalt.scene import explanation
+
+    lines = []
+    facts: dict = {"run": name}
+    if size:
+        lines += [cubes_sentence(size), ""]
+        facts["shards"] = size
+    lines += explanation.verdict(findings)
     if changes and not options.no_table:
         lines += ["", *explanation.effects_table(changes, options.sources)]
-    for finding in findings if options.levels else []:
-        lines += ["", *explanation.level_lines(finding)]
-    facts = {
-        "findings": [row._asdict() for row in findings],
-        "changes": [row._asdict() for row in changes],
-    }
-    return Answer(
-        {"run": config["run"], **({"shards": size} if size else {}), **facts}, "\n".join(lines)
-    )
+    if options.levels:
+        for finding in findings:
+            lines += ["", *explanation.level_lines(finding)]
+    facts["findings"] = [row._asdict() for row in findings]
+    facts["changes"] = [row._asdict() for row in changes]
+    return Answer(facts, "\n".join(lines))
 
 
 def _size(config: dict, inputs: Path | None) -> dict:
-    """The size of a scene's data set if its shards are cubes, else an empty text."""
+    """The size of a scene's data set if its shards are cubes, else an empty mapping."""
     if config["shards"]["kind"] != "cube":
         return {}
     records = records_of(config["targets"], inputs)
-    return cubes_size(
-        config, Plan.of(config, {name: record["published"] for name, record in records.items()})
-    )
+    published = {name: record["published"] for name, record in records.items()}
+    return cubes_size(config, Plan.of(config, published))
 
 
 def _shown(
     config: dict, stations: list[str], model: Path | None
 ) -> Callable[[np.ndarray], dict[str, np.ndarray]]:
-    """The function that turns signals (K, stations, N) into pixels, and into the answers of a
-    trained model.
-    """
+    """The function that turns signals (K, stations, N) into pixels and a model's answers."""
     from lowalt.config.network import Network
     from lowalt.tiles import Renderer
 

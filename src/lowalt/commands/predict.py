@@ -1,4 +1,4 @@
-"""The command `lowalt predict`: what a trained model says of a tile, of signals or of a recording."""
+"""The command `lowalt predict`: a trained model's answer on a tile, signals or a recording."""
 
 import argparse
 import sys
@@ -47,18 +47,25 @@ def run(options: argparse.Namespace) -> Answer:
         raise InputError(f"{options.input}: expected a tile (.png) or signals (.npy){others}")
     existing(path_of(options.model), "model")
     existing(options.input, "input")
-    reader = _reader(options.input.suffix) if options.input.suffix in readers else None
-    content = reader.read(options.input) if reader else None
-    config = overlaid(options.overlay) if options.overlay else {}
+    reader = None
+    if options.input.suffix in readers:
+        reader = _reader(options.input.suffix)
+        content = reader.read(options.input)
+    config: dict = {}
+    if options.overlay:
+        # The backbone that an overlay of the user names is trusted, so that block counts here.
+        config = overlaid(options.overlay, unused=())
     # What can be refused without torch has been refused: it takes seconds to import.
     if sys.stderr.isatty():
         print("lowalt predict: loading the network", file=sys.stderr, flush=True)
     from lowalt.recognition.predict_sample import predict
     from lowalt.recognition.runs import opened
 
-    own = options.backbone or (config["recognition"]["network"]["backbone"] if config else "")
+    own_backbone = options.backbone
+    if config and not own_backbone:
+        own_backbone = config["recognition"]["network"]["backbone"]
     with announced("lowalt predict: loading the network"):
-        model, settings = opened(options.model, trusted=own)
+        model, settings = opened(options.model, trusted=own_backbone)
     if reader:
         return Answer(*reader.answer(model, settings, content, str(options.input)))
     if "radar" in settings and options.input.suffix == ".npy":
@@ -69,10 +76,8 @@ def run(options: argparse.Namespace) -> Answer:
         config = config or overlaid([])
         settings = {key: config[key] for key in ("network", "spectra", "images")}
     shares = predict(model, options.input, settings)
-    lines = [
-        f"{100 * share:6.2f} %  {name}"
-        for name, share in sorted(shares.items(), key=lambda pair: -pair[1])
-    ]
+    best_first = sorted(shares.items(), key=lambda pair: -pair[1])
+    lines = [f"{100 * share:6.2f} %  {name}" for name, share in best_first]
     return Answer(shares, "\n".join(lines))
 
 

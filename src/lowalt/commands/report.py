@@ -1,6 +1,4 @@
-"""The command `lowalt report`: the page of one run, or a page that links all runs and compares any
-two.
-"""
+"""The command `lowalt report`: the page of one run, or a page that links and compares all runs."""
 
 import argparse
 import tempfile
@@ -11,14 +9,13 @@ import yaml
 from lowalt.commands import workflow
 from lowalt.commands.command_line import Answer, add_command
 from lowalt.commands.compare import facts
+from lowalt.config.brought import refuse_brought, refuse_training
 from lowalt.config.layers import SCHEMA, check, of_run
 from lowalt.config.named_code import allowed
 from lowalt.files.atomic import write_file
-from lowalt.files.csv_tables import read_csv
 from lowalt.files.errors import InputError
-from lowalt.files.shipped import as_named, located, shipped
+from lowalt.files.shipped import as_named, shipped
 from lowalt.files.yaml_files import load_yaml
-from lowalt.scene.trust import refuse_effects
 
 BASE = "config/default.yaml"
 
@@ -49,7 +46,9 @@ def run(options: argparse.Namespace) -> Answer:
         raise InputError(
             "report: expected the folder of a run, such as results/default, or --gallery"
         )
-    return gallery(options.results) if options.gallery else page(options)
+    if options.gallery:
+        return gallery(options.results)
+    return page(options)
 
 
 def page(options: argparse.Namespace) -> Answer:
@@ -64,7 +63,8 @@ def page(options: argparse.Namespace) -> Answer:
     written = f"results/{name}/report.html"
     if not isinstance(name, str) or options.run.resolve() != Path(written).parent.resolve():
         raise InputError(
-            f"{options.run}: its config.yaml is of the run {name!r}, expected to stand in results/{name}"
+            f"{options.run}: its config.yaml is of the run {name!r}, expected to stand in "
+            f"results/{name}"
         )
     _refuse_code(config, options.run)
     with tempfile.NamedTemporaryFile("w", suffix=".yaml") as overlay:
@@ -80,24 +80,24 @@ def page(options: argparse.Namespace) -> Answer:
             "printshellcmds": False,
         }
         ran = workflow.ended(argparse.Namespace(**vars(options) | line))
-    files = [] if options.dry_run or ran["status"] else [written]
+    files = []
+    if not options.dry_run and ran["status"] == 0:
+        files.append(written)
     return Answer({"files": files, **ran}, "".join(files), ran["status"])
 
 
 def _refuse_code(config: dict, folder: Path) -> None:
-    """Refuse a run whose configuration, or whose table of schemes, names code that the workflow
-    would run.
+    """Refuse a run that names code, weights or files elsewhere, which the workflow would use.
+
+    Both its configuration and its table of schemes are looked at.
     """
-    refuse_effects(check(config, shipped(SCHEMA))["effects"], folder)
-    block = located(config)["recognition"]
+    check(config, shipped(SCHEMA))
     how = (
         f"an overlay of your own that names it: `lowalt run OVERLAY --target {folder}/report.html`"
     )
-    for name in (
-        block["network"]["backbone"],
-        *(row["backbone"] for row in read_csv(block["table"], "backbone")),
-    ):
-        allowed(name, "", folder, how)
+    allowed(config["recognition"]["network"]["backbone"], "", folder, how)
+    refuse_brought(config, folder / "config.yaml")
+    refuse_training(config, folder, how)
 
 
 def gallery(results: Path) -> Answer:
@@ -121,7 +121,8 @@ def gallery(results: Path) -> Answer:
     write_file(
         results / "index.html", all_runs({path.name: facts(path) for path in folders}, pages)
     )
-    text = f"{results / 'index.html'}: {len(folders)} run{'s' if len(folders) > 1 else ''}"
-    return Answer(
-        {"files": [results / "index.html"], "runs": [path.name for path in folders]}, text
-    )
+    index = results / "index.html"
+    names = [path.name for path in folders]
+    plural = "s" if len(folders) > 1 else ""
+    text = f"{index}: {len(folders)} run{plural}"
+    return Answer({"files": [index], "runs": names}, text)

@@ -1,6 +1,4 @@
-"""The command `lowalt sample`: one sample of a configuration as files and as a picture with axes,
-or its raw echo.
-"""
+"""The command `lowalt sample`: one sample as files and a picture with axes, or its raw echo."""
 
 import argparse
 import math
@@ -50,33 +48,32 @@ def add_to(commands: argparse._SubParsersAction, name: str) -> None:
 
 
 def run(options: argparse.Namespace) -> Answer:
-    """Write {key}.png, .npy and .json as the shards hold them, and {key}-axes.png; answer with what
-    was written.
+    """Write {key}.png, .npy and .json as the shards hold them, and {key}-axes.png.
 
-    Raises: InputError for a wrong configuration, subtype or model.
+    The answer names the files. Raises: InputError for a wrong configuration, subtype or model.
     """
     config = overlaid(options.overlay)
     selected = config["targets"]["select"]
     if options.model < 0 or (selected and options.subtype not in selected):
         raise InputError(
-            f"{options.subtype!r}, model {options.model}: expected a selected subtype and a number from 0"
+            f"{options.subtype!r}, model {options.model}: expected a selected subtype and a number "
+            "from 0"
         )
     dataset = alone(config, options.subtype)
     if options.raw:
         return _raw(options, dataset)
     from lowalt.report.figures.tile_axes import figure
 
-    place = dataset.place_of(options.subtype, options.model, options.snr)
-    image, signal, _ = dataset.made(place)
+    index = dataset.place_of(options.subtype, options.model, options.snr)
+    image, signal, _ = dataset.made(index)
     key = sample_key(options.subtype, options.model, options.snr)
     renderer = dataset.maker.renderer
     noise = "no noise" if math.isinf(options.snr) else f"SNR {options.snr:g} dB"
+    title = f"{options.subtype}, motion model {options.model}, {noise}"
     written = {
         f"{key}.png": encode(image, renderer.images.palette),
-        f"{key}.json": dataset.made_record(place),
-        f"{key}-axes.png": figure(
-            image, renderer, f"{options.subtype}, motion model {options.model}, {noise}"
-        ),
+        f"{key}.json": dataset.made_record(index),
+        f"{key}-axes.png": figure(image, renderer, title),
     }
     for name, data in written.items():
         write_file(options.out / name, data)
@@ -87,16 +84,15 @@ def run(options: argparse.Namespace) -> Answer:
 
 
 def _raw(options: argparse.Namespace, dataset: Dataset) -> Answer:
-    """Write {key}-{station}-{place}.npz, and .h5 where h5py is installed, of each station asked
-    for.
+    """Write {key}-{station}-{place}.npz, and .h5 where h5py is installed.
+
+    The files are of the station that --station names, otherwise of each station.
     """
     key = sample_key(options.subtype, options.model, options.snr)
     files = []
-    names = (
-        [options.station]
-        if options.station
-        else [station.name for station in dataset.maker.network.stations]
-    )
+    names = [options.station]
+    if not options.station:
+        names = [station.name for station in dataset.maker.network.stations]
     for name in names:
         echo = receive(dataset, options.subtype, options.model, name, options.raw, options.snr)
         files += write(echo, options.out / f"{key}-{name}-{options.raw}")

@@ -1,6 +1,4 @@
-"""The command `lowalt spectra`: a configuration's spectra, their settings and sources, and the time
-per image.
-"""
+"""The command `lowalt spectra`: settings and sources of the spectra, and the time per image."""
 
 import argparse
 import functools
@@ -28,8 +26,9 @@ def add_to(commands: argparse._SubParsersAction, name: str) -> None:
 
 
 def facts(config: dict) -> list[dict]:
-    """Return the facts on each spectrum of a checked configuration: size, index of zero, time,
-    settings, source.
+    """Return the facts on each spectrum of a checked configuration.
+
+    They are its size, the index of zero, the time of an image, its settings and its source.
     """
     renderer = Renderer.from_settings(
         {key: config[key] for key in ("network", "spectra", "images")}
@@ -45,18 +44,15 @@ def facts(config: dict) -> list[dict]:
     rows = []
     for name, settings in renderer.spectra.items():
         kind = spectrum(name)
-        cells = isinstance(kind, OfCells)
-        count = (
-            kind.columns(settings, symbols)
-            if cells
-            else windows(symbols, settings.window, settings.hop, name)
-        )
-        heard = (
-            Cube(np.repeat(signal[:, None], settings.cells, axis=1), still, no_truth)
-            if cells
-            else signal
-        )
-        draw = functools.partial(renderer.image, heard, 0, name, image)
+        received: np.ndarray | Cube
+        if isinstance(kind, OfCells):
+            count = kind.columns(settings, symbols)
+            cells = np.repeat(signal[:, None], settings.cells, axis=1)
+            received = Cube(cells, still, no_truth)
+        else:
+            count = windows(symbols, settings.window, settings.hop, name)
+            received = signal
+        draw = functools.partial(renderer.image, received, 0, name, image)
         draw()
         rows.append(
             {
@@ -74,7 +70,7 @@ def facts(config: dict) -> list[dict]:
 
 
 def run(options: argparse.Namespace) -> Answer:
-    """Describe the spectra of a configuration. Raises: InputError where the configuration is wrong."""
+    """Describe the spectra of a configuration. Raises: InputError for a wrong configuration."""
     rows = facts(overlaid(options.overlay))
     hardware = describe()
     lines = []

@@ -1,6 +1,4 @@
-"""The commands `lowalt run` and `lowalt status`, which call Snakemake in the same folders and
-files.
-"""
+"""The commands `lowalt run` and `lowalt status`, for the workflow in the current folder."""
 
 import argparse
 import json
@@ -13,9 +11,10 @@ from pathlib import Path
 
 from lowalt.commands.command_line import Answer, add_command
 from lowalt.config.command import exit_status
+from lowalt.config.layers import read_layer
 from lowalt.files.errors import InputError
 from lowalt.files.shipped import SHIPPED, shipped
-from lowalt.files.yaml_files import load_yaml
+from lowalt.machine.run_pipe import hold_pipe
 from lowalt.workflow import status
 from lowalt.workflow.status import PLANNED_JOBS
 
@@ -52,24 +51,19 @@ def add_to(commands: argparse._SubParsersAction, name: str) -> None:
     )
 
 
-def command(options: argparse.Namespace) -> list[str]:
-    """Return the command line of Snakemake.
-
-    Raises: InputError naming an overlay that is missing or no YAML mapping, wrong cores, a profile
-    that is not there, or where there is no Snakefile.
-    """
+def _refuse(options: argparse.Namespace) -> None:
+    """Refuse options that Snakemake would ignore or refuse in words of its own."""
     if not SNAKEFILE.is_file():
         raise InputError(
-            f"no {SNAKEFILE}: this installation has no workflow, expected one from a wheel or a clone"
+            f"no {SNAKEFILE}: this installation has no workflow, expected one from a wheel or a "
+            "clone"
         )
-    overlays = [*options.overlay, *options.configfile]
-    for path in overlays:
+    for path in [*options.overlay, *options.configfile]:
         if not path.is_file():
             raise InputError(
                 f"configuration: no file at {path} (a rule or file to make is named by --target)"
             )
-        load_yaml(path)
-    base = [] if Path("config/default.yaml").is_file() else [SHIPPED / "config/default.yaml"]
+        read_layer(path, trains=True)
     if options.cores not in (None, "all") and not (
         options.cores.isdecimal() and int(options.cores)
     ):
@@ -79,48 +73,61 @@ def command(options: argparse.Namespace) -> list[str]:
     # Snakemake would silently ignore a missing profile.
     if options.profile and not any(options.profile.glob("config*.yaml")):
         raise InputError(
-            f"--profile {options.profile}: no config.yaml there, expected a folder such as profiles/slurm"
+            f"--profile {options.profile}: no config.yaml there, expected a folder such as "
+            "profiles/slurm"
         )
-    cores = options.cores or (None if options.profile else "all")
-    line = [
-        sys.executable,
-        "-m",
-        "snakemake",
-        "--snakefile",
-        str(SNAKEFILE),
-        *(["--cores", cores] if cores else []),
-    ]
-    profile = options.profile or (
-        None if Path("profiles").is_dir() else shipped("profiles/default")
-    )
-    line += ["--workflow-profile", str(profile)] if profile else []
-    line += ["--configfile", *map(str, [*base, *overlays])] if base or overlays else []
-    line += [
-        *(["--dry-run"] if options.dry_run else []),
-        *(["--printshellcmds"] if options.printshellcmds else []),
-    ]
-    return [*line, "--", *options.target] if options.target else line
+
+
+def command(options: argparse.Namespace) -> list[str]:
+    """Return the command line of Snakemake.
+
+    Raises: InputError naming an overlay that is missing, no YAML mapping, or of a run and names
+    code, wrong cores, a profile that is not there, or where there is no Snakefile.
+    """
+    _refuse(options)
+    line = [sys.executable, "-m", "snakemake", "--snakefile", str(SNAKEFILE)]
+    if options.cores:
+        line += ["--cores", options.cores]
+    elif not options.profile:
+        line += ["--cores", "all"]
+    if options.profile:
+        line += ["--workflow-profile", str(options.profile)]
+    elif not Path("profiles").is_dir():
+        line += ["--workflow-profile", str(shipped("profiles/default"))]
+    configfiles = [*options.overlay, *options.configfile]
+    if not Path("config/default.yaml").is_file():
+        configfiles.insert(0, SHIPPED / "config/default.yaml")
+    if configfiles:
+        line += ["--configfile", *map(str, configfiles)]
+    if options.dry_run:
+        line.append("--dry-run")
+    if options.printshellcmds:
+        line.append("--printshellcmds")
+    if options.target:
+        line += ["--", *options.target]
+    return line
 
 
 def ended(options: argparse.Namespace) -> dict:
-    """Run Snakemake in this folder and return its exit status, and with `options.json` what
-    happened.
+    """Run Snakemake in this folder and return its exit status and, for JSON, what happened.
 
-    That is the command line, the seconds, and by name the stages whose jobs ran; of a dry run the
-    jobs that would run, each with its rule, files and reason. Snakemake's own text then goes to the
-    standard error stream.
+    With `options.json` the answer has the command line, the seconds, and by name the stages whose
+    jobs ran; of a dry run the jobs that would run, each with its rule, files and reason.
+    Snakemake's own text then goes to the standard error stream.
     Raises: as `command`.
     """
     line = command(options)
+    pipe = hold_pipe()
     if not options.json:
-        return {"status": exit_status(subprocess.run(line).returncode)}
+        return {"status": exit_status(subprocess.run(line, pass_fds=[pipe]).returncode)}
     begun = time.time()
     with tempfile.TemporaryDirectory() as folder:
         jobs = Path(folder, "jobs")
-        ran = subprocess.run(line, stdout=2, env=os.environ | {PLANNED_JOBS: str(jobs)})
-        planned = (
-            [json.loads(text) for text in jobs.read_text().splitlines()] if jobs.exists() else []
-        )
+        environment = os.environ | {PLANNED_JOBS: str(jobs)}
+        ran = subprocess.run(line, stdout=2, env=environment, pass_fds=[pipe])
+        planned = []
+        if jobs.exists():
+            planned = [json.loads(text) for text in jobs.read_text().splitlines()]
     answer = {
         "status": exit_status(ran.returncode),
         "command": line,
@@ -129,7 +136,10 @@ def ended(options: argparse.Namespace) -> dict:
     if options.dry_run:
         return answer | {"jobs": planned}
     kept = [entry for entry in status.read() if entry["written"] >= begun]
-    return answer | {"stages": kept[-1]["board"]["stages"] if kept else {}}
+    answer["stages"] = {}
+    if kept:
+        answer["stages"] = kept[-1]["board"]["stages"]
+    return answer
 
 
 def run(options: argparse.Namespace) -> Answer:

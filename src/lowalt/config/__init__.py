@@ -1,3 +1,4 @@
-"""The configuration: its layers, schema, stations, classes and folds, and the interface of
-extensions. No stage is known here.
+"""The configuration: layers, schema, stations, classes, folds, and the interface of extensions.
+
+No stage is known here.
 """

@@ -17,8 +17,9 @@ def snrs_of(config: dict) -> tuple[float, ...]:
 
 
 def motion_block(config: dict) -> dict:
-    """Return the block `motion` of a configuration; where it has `looks`, with look_s, the length
-    of a look (s).
+    """Return the block `motion` of a configuration.
+
+    Where it has `looks`, the block gets the key look_s, the length of a look (s).
     """
     motion = config["motion"]
     if "looks" not in motion:

@@ -1,5 +1,4 @@
-"""Common parts of the stages' command lines: the settings argument, one-line errors, and peak
-memory.
+"""What the stages' command lines share: the settings argument, one-line errors, peak memory.
 
 A stage's settings arrive as one JSON object: `--settings '{"...": ...}'` or `--settings
 @file.json`. The workflow passes the object itself, so that Snakemake notices every change; users
@@ -10,6 +9,7 @@ import argparse
 import contextlib
 import errno
 import functools
+import os
 import resource
 import sys
 import warnings
@@ -17,22 +17,32 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from lowalt.files.atomic import text_of
-from lowalt.files.errors import InputError, InputWarning, lacking, shortened
+from lowalt.files.atomic import FULL, text_of
+from lowalt.files.errors import (
+    InputError,
+    InputWarning,
+    in_one_line,
+    in_plain_characters,
+    lacking,
+    shortened,
+)
 from lowalt.files.json_objects import json_object
 from lowalt.machine.memory import keep_freed_memory
+from lowalt.machine.run_pipe import end_with_starter
 
 
 def exit_status(code: int) -> int:
-    """Return the exit status of a process as a shell reports it: 128 + signal number if a signal
-    ended it.
+    """Return the exit status of a process as a shell reports it.
 
-    code: return code of `subprocess`, negative for a signal.
+    code: return code of `subprocess`, which is minus the number of the signal that ended the
+    process; a shell reports 128 + the number.
     """
-    return code if code >= 0 else 128 - code
+    if code >= 0:
+        return code
+    return 128 - code
 
 
-def parser(module: str, description: str) -> argparse.ArgumentParser:
+def parser(module: str, description: str | None) -> argparse.ArgumentParser:
     """Return an argument parser for `python -m {module}` that already has `--settings`."""
     result = argparse.ArgumentParser(prog=f"python -m {module}", description=description)
     result.add_argument(
@@ -42,9 +52,7 @@ def parser(module: str, description: str) -> argparse.ArgumentParser:
 
 
 def name_backbone(line: argparse.ArgumentParser) -> None:
-    """Add the option with which a user names the code of a model's backbone, which the model's file
-    may not choose.
-    """
+    """Add the option for the code of a model's backbone, which the model's file may not choose."""
     line.add_argument(
         "--backbone",
         default="",
@@ -54,9 +62,7 @@ def name_backbone(line: argparse.ArgumentParser) -> None:
 
 
 def _argument(text: str) -> dict:
-    """Return `settings` of the text but keep its error message, which argparse would replace for a
-    ValueError.
-    """
+    """Return `settings` of the text; argparse would replace the message of its ValueError."""
     try:
         return settings(text)
     except InputError as error:
@@ -113,38 +119,60 @@ REFUSED = (
 """Operating system errors caused by a path of the user, such as a read-only folder."""
 
 
-def refusal(error: InputError | OSError | ImportError) -> str:
-    """Return the message of a refusal, of bounded length: that of an InputError, one about the path
-    in an error of the operating system, or one about a package that is not installed.
+REFUSALS = (InputError, OSError, ImportError, MemoryError)
+"""Errors that become one sentence, as far as `refusal` knows them."""
 
-    Raises: any other error unchanged.
+
+def refusal(error: InputError | OSError | ImportError | MemoryError) -> str:
+    """Return the message of a refusal, of bounded length.
+
+    It is that of an InputError, one about the path in an error of the operating system, about a
+    full disk or output, about memory, or about a package that is not installed. Raises: any other
+    error unchanged.
     """
+    if isinstance(error, MemoryError):
+        return f"memory: not enough ({in_one_line(error)}), expected more of it, or a smaller input"
+    if isinstance(error, OSError) and error.errno in FULL:
+        return f"{error.filename or 'standard output'}: {error.strerror}, expected room to write"
     if isinstance(error, InputError):
         return str(error)
     if isinstance(error, ImportError):
         return str(lacking(error))
     if error.errno not in REFUSED or error.filename is None:
         raise error
-    return shortened(
-        f"{error.filename}: {error.strerror}, expected a file or folder that this user may read or write"
+    refused = (
+        f"{error.filename}: {error.strerror}, expected a file or folder that this user may read "
+        "or write"
     )
+    return shortened(in_plain_characters(refused))
+
+
+def drop_output() -> None:
+    """Let what is still to be written on standard output go nowhere: Python would try again when it
+    ends.
+    """
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 @contextlib.contextmanager
 def refusing() -> Iterator[None]:
-    """Turn an InputError, an operating system error about a path, or a missing package into one
-    line and status 2.
-    """
+    """Turn what `refusal` knows, such as an InputError or a full output, into a line and status 2."""
     try:
-        yield
-    except (InputError, OSError, ImportError) as error:
+        try:
+            yield
+        finally:
+            sys.stdout.flush()
+    except REFUSALS as error:
+        if isinstance(error, OSError) and error.errno in FULL:
+            drop_output()
         print(f"error: {refusal(error)}", file=sys.stderr)
         raise SystemExit(2) from None
 
 
 class Refusing:
-    """Wraps an object so that its methods handle errors as `refusing` does; Snakemake would print
-    tracebacks.
+    """Wraps an object whose methods then handle errors as `refusing` does.
+
+    Snakemake would print tracebacks.
     """
 
     def __init__(self, held: object) -> None:
@@ -169,18 +197,27 @@ USUAL_FORMAT = warnings.formatwarning
 
 
 def warn_in_one_line() -> None:
-    """Print each InputWarning as one line without its place in the source."""
-    warnings.formatwarning = lambda message, category, *place, **more: (
-        f"warning: {message}\n"
-        if issubclass(category, InputWarning)
-        else USUAL_FORMAT(message, category, *place, **more)
-    )
+    """Print each InputWarning as one line, without the line of source that it comes from.
+
+    Warnings of libraries are not printed, unless `python -W` or PYTHONWARNINGS asks for warnings.
+    """
+    if not sys.warnoptions:
+        # What a library finds odd in a file stands in front of the sentence that says it.
+        warnings.simplefilter("ignore")
+        warnings.simplefilter("default", InputWarning)
+
+    def in_one_line(message: Any, category: Any, *where: Any, **more: Any) -> str:
+        """The text of a warning."""
+        if issubclass(category, InputWarning):
+            return f"warning: {message}\n"
+        return USUAL_FORMAT(message, category, *where, **more)
+
+    warnings.formatwarning = in_one_line
 
 
 def run(main: Callable[[list[str]], None]) -> None:
-    """Run a stage's `main` on the process's arguments, as `refusing` says; an InputWarning becomes
-    one line.
-    """
+    """Run a stage's `main` on the process's arguments; errors and warnings become one line."""
+    end_with_starter()
     keep_freed_memory()
     warn_in_one_line()
     with refusing():

@@ -7,9 +7,7 @@ from typing import NamedTuple
 
 
 class Command(NamedTuple):
-    """One command: its module, which offers `add_to(commands, name)`, its line of help, and an
-    example.
-    """
+    """One command: its module, which offers `add_to(commands, name)`, its help, an example."""
 
     module: str
     meaning: str

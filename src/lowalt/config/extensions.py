@@ -24,8 +24,7 @@ GROUP = "lowalt.extensions"
 
 
 class AddedEffect(NamedTuple):
-    """An effect: its module, which keeps `lowalt.scene.contract`, its place in the chain, and its
-    order there.
+    """An effect: its module, which keeps `lowalt.scene.contract`, and its place in the chain.
 
     after: the effect of the same place behind which it acts; by default it acts behind all of its
     place.
@@ -72,32 +71,35 @@ class Extension:
     section: modules that offer `values(run)` beside a template of the same name."""
 
 
-KINDS = {
-    one.name: {"commands": Command, "effects": AddedEffect}.get(one.name, str)
-    for one in fields(Extension)
-}
+KINDS: dict[str, type] = dict.fromkeys((one.name for one in fields(Extension)), str)
+KINDS |= {"commands": Command, "effects": AddedEffect}
 """Type of what an extension offers under a name, by the fields of `Extension`."""
 
 
 class Installed(NamedTuple):
-    """The extensions of this installation by their names, their packages, and a sentence for each
-    left out.
-    """
+    """The extensions of this installation and their packages by name; a sentence per faulty one."""
 
     extensions: dict[str, Extension]
     packages: dict[str, str]
     faults: list[str]
 
 
+def _package(point: EntryPoint) -> str:
+    """The name of the package that brings an extension."""
+    if point.dist is None:
+        return "an unknown package"
+    return point.dist.name
+
+
 def _label(point: EntryPoint) -> str:
     """How sentences call an extension: its name and the package that brings it."""
-    package = point.dist.name if point.dist else "an unknown package"
-    return f"extension {point.name!r} of the package {package!r}"
+    return f"extension {point.name!r} of the package {_package(point)!r}"
 
 
 def _loaded(point: EntryPoint) -> Extension:
-    """The extension of an entry point. Raises: InputError naming it where it cannot be imported or
-    is none.
+    """The extension of an entry point.
+
+    Raises: InputError naming it where it cannot be imported or is none.
     """
     try:
         extension = point.load()
@@ -116,15 +118,14 @@ def _loaded(point: EntryPoint) -> Extension:
         for name, value in offered.items():
             if not isinstance(name, str) or not isinstance(value, wanted):
                 raise InputError(
-                    f"{_label(point)}: {kind} {name!r} is {shown(value)}, expected a {wanted.__name__}"
+                    f"{_label(point)}: {kind} {name!r} is {shown(value)}, "
+                    f"expected a {wanted.__name__}"
                 )
     return extension
 
 
 def _core_names() -> dict[str, set[str]]:
-    """The names that the core has, by the fields of `Extension` in which an extension could take
-    one.
-    """
+    """The names that the core has, by the fields of `Extension` that could take one of them."""
     effects = {path.stem for path in PACKAGE.glob("scene/effects/*/*.py")}
     spectra = {path.stem for path in PACKAGE.glob("spectra/kinds/*.py")}
     rooms = {path.stem for path in PACKAGE.iterdir()}
@@ -137,9 +138,7 @@ def _core_names() -> dict[str, set[str]]:
 
 
 def _taken(extension: Extension, others: dict[str, Extension]) -> str:
-    """Say what an extension offers under a name that the core or another one has; "" where all its
-    names are free.
-    """
+    """Say what an extension offers under a name that is taken; "" where all its names are free."""
     core = _core_names()
     for kind in KINDS:
         owners = {name: "lowalt's own" for name in core.get(kind, ())}
@@ -153,10 +152,10 @@ def _taken(extension: Extension, others: dict[str, Extension]) -> str:
 
 @functools.cache
 def found() -> Installed:
-    """Return the extensions that are installed, read once per process; a faulty one is left out
-    whole.
+    """Return the extensions that are installed, read once per process.
 
-    Those of lowalt's own package come first, the others in the order of their packages and names.
+    A faulty one is left out whole. Those of lowalt's own package come first, the others in the
+    order of their packages and names.
     """
     extensions: dict[str, Extension] = {}
     packages: dict[str, str] = {}
@@ -164,7 +163,7 @@ def found() -> Installed:
 
     def order(point: EntryPoint) -> tuple[bool, str, str]:
         """Own extensions first, so that a stranger's cannot take their names."""
-        package = point.dist.name if point.dist else ""
+        package = _package(point)
         return package != "lowalt", package, point.name
 
     for point in sorted(entry_points(group=GROUP), key=order):
@@ -180,7 +179,7 @@ def found() -> Installed:
             faults.append(f"{_label(point)}: {taken}")
             continue
         extensions[point.name] = extension
-        packages[point.name] = point.dist.name if point.dist else "an unknown package"
+        packages[point.name] = _package(point)
     return Installed(extensions, packages, faults)
 
 
@@ -194,7 +193,10 @@ def offered(kind: str) -> dict[str, Any]:
 
 def owner(kind: str, name: str) -> str:
     """Return the name of the extension that offers `name`, "" where none does."""
-    return next((own for own, one in found().extensions.items() if name in getattr(one, kind)), "")
+    for own_name, extension in found().extensions.items():
+        if name in getattr(extension, kind):
+            return own_name
+    return ""
 
 
 def module_offered(kind: str, name: str, module: str) -> ModuleType:
@@ -213,8 +215,9 @@ def module_offered(kind: str, name: str, module: str) -> ModuleType:
 
 
 def function_offered(kind: str, name: str, module: str, function: str) -> Callable[..., Any]:
-    """Return a function of a module of an extension. Raises: InputError where it has none of this
-    name.
+    """Return a function of a module of an extension.
+
+    Raises: InputError where it has none of this name.
     """
     loaded = module_offered(kind, name, module)
     if not callable(getattr(loaded, function, None)):
@@ -225,15 +228,17 @@ def function_offered(kind: str, name: str, module: str, function: str) -> Callab
 
 
 def extensions_in_words() -> str:
-    """Return a line for each extension: its name, its package, and what it adds; then a sentence
-    for each fault.
-    """
-    lines = ["extensions:"] if found().extensions else []
-    for name, extension in found().extensions.items():
-        added = [
-            f"{kind} {', '.join(getattr(extension, kind))}"
-            for kind in KINDS
-            if getattr(extension, kind)
-        ]
-        lines.append(f"  {name} (package {found().packages[name]}): {'; '.join(added)}")
-    return "\n".join([*lines, *(f"left out: {fault}" for fault in found().faults)])
+    """Return a line per extension: name, package and what it adds; then a sentence per fault."""
+    installed = found()
+    lines = []
+    if installed.extensions:
+        lines.append("extensions:")
+    for name, extension in installed.extensions.items():
+        added = []
+        for kind in KINDS:
+            names = getattr(extension, kind)
+            if names:
+                added.append(f"{kind} {', '.join(names)}")
+        lines.append(f"  {name} (package {installed.packages[name]}): {'; '.join(added)}")
+    lines += [f"left out: {fault}" for fault in installed.faults]
+    return "\n".join(lines)

@@ -11,8 +11,10 @@ from lowalt.files.errors import InputError
 
 def file_of(name: str) -> Path | None:
     """Return the Python file in a backbone's name, None for the name of a library's model."""
-    path, colon, _ = name.rpartition(":")
-    return Path(path) if colon and path.endswith(".py") else None
+    path, _, _ = name.rpartition(":")
+    if not path.endswith(".py"):
+        return None
+    return Path(path)
 
 
 BY_NAME = "`--backbone FILE.py:FUNCTION` (in Python `backbone=`) with code that you trust"

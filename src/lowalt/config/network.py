@@ -18,21 +18,20 @@ SPEED_OF_LIGHT = 299_792_458.0
 
 
 def _positive(name: str, value: float, *, whole: bool = False) -> None:
-    """Raise InputError unless the value is a positive finite number, an integer where `whole` is
-    set.
-    """
-    good = isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
-    good = good and math.isfinite(value) and value > 0 and (not whole or float(value).is_integer())
-    if not good:
-        raise InputError(
-            f"network: {name} is {value!r}, expected a positive {'integer' if whole else 'finite number'}"
-        )
+    """Raise InputError unless the value is a positive finite number, or integer for `whole`."""
+    number = isinstance(value, (int, float, np.integer, np.floating))
+    positive = number and not isinstance(value, bool) and math.isfinite(value) and value > 0
+    if whole and not (positive and float(value).is_integer()):
+        raise InputError(f"network: {name} is {value!r}, expected a positive integer")
+    if not positive:
+        raise InputError(f"network: {name} is {value!r}, expected a positive finite number")
 
 
 @dataclass(frozen=True)
 class Station:
-    """One base station: `position_m` (x, y, z) of its arrays, `normal_rad` Theta_k, lowest
-    subcarrier f_k (Hz).
+    """One base station: `position_m` (x, y, z) of its arrays, `normal_rad` Theta_k, and f_k.
+
+    f_k, `frequency_hz`, is its lowest subcarrier.
     """
 
     name: str
@@ -41,8 +40,9 @@ class Station:
     frequency_hz: float
     transmitter: "Station | None" = None
     receiver: "Station | None" = None
-    """The two stations of a link, which has the receiver's place and the transmitter's frequency;
-    else None.
+    """The two stations of a link, otherwise None.
+
+    A link has the receiver's position and the transmitter's frequency.
     """
 
     @property
@@ -52,14 +52,17 @@ class Station:
         return np.array([-sine, cosine, 0.0])
 
 
-def _link(name: str, place: dict, known: dict[str, Station]) -> Station:
-    """The station `place["receive"]` as the receiver of what `place["transmit"]` sends."""
-    ends = [place["transmit"], place["receive"]]
-    if not set(ends) <= set(known) or ends[0] == ends[1]:
+def _link(name: str, block: dict, known: dict[str, Station]) -> Station:
+    """The link of a block {transmit, receive} with the names of two known stations."""
+    sender = block["transmit"]
+    receiver = block["receive"]
+    if sender not in known or receiver not in known or sender == receiver:
         raise InputError(
-            f"network: stations.{name}: from {ends[0]!r} to {ends[1]!r}, expected two of {sorted(known)}"
+            f"network: stations.{name}: from {sender!r} to {receiver!r}, expected two of "
+            f"{sorted(known)}"
         )
-    sends, hears = (known[end] for end in ends)
+    sends = known[sender]
+    hears = known[receiver]
     return Station(name, hears.position_m, hears.normal_rad, sends.frequency_hz, sends, hears)
 
 
@@ -72,29 +75,29 @@ def station_names(block: dict) -> list[str]:
 
 
 def as_far_as(block: dict, name: str) -> dict:
-    """Return a `network` block with only those stations on which the echo at the station `name`
-    depends.
+    """Return a `network` block with only those stations that the echo at `name` depends on.
 
     Its sub-band depends on the number of stations before it; a link needs the two stations that it
     connects.
     """
     stations = block["stations"]
-    last = max(name, *(stations[name].get(end, name) for end in ("transmit", "receive")))
-    kept = {
-        other: place
-        for other, place in stations.items()
-        if other == name or (other <= last and "transmit" not in place)
-    }
+    own = stations[name]
+    last = max(name, own.get("transmit", name), own.get("receive", name))
+    kept = {}
+    for other, settings in stations.items():
+        is_link = "transmit" in settings
+        if other == name or (other <= last and not is_link):
+            kept[other] = settings
     return {**block, "stations": kept}
 
 
 def masts_m(block: dict) -> list[list[float]]:
-    """Return the places [x, y] (m) of the stations of a `network` block, in its order; links have
-    none.
+    """Return the positions [x, y] (m) of the stations of a `network` block, in its order.
+
+    Links have no position.
     """
-    return [
-        place["position_m"][:2] for place in block["stations"].values() if "position_m" in place
-    ]
+    stations = block["stations"].values()
+    return [settings["position_m"][:2] for settings in stations if "position_m" in settings]
 
 
 TERMS = {"ofdm": set(), "fmcw": {"sweep_hz", "sweep_s", "samples"}, "cw": set()}
@@ -104,8 +107,7 @@ OFDM = ("subcarriers", "subcarrier_spacing_hz", "guard_subcarriers")
 
 
 def band(block: dict) -> dict:
-    """Return the keys `OFDM` of a `network` block, whose waveform may state its band in other
-    terms.
+    """Return the keys `OFDM` of a `network` block whose waveform may state its band otherwise.
 
     Sample m of an FMCW sweep is measured at the frequency of subcarrier m; a continuous wave is one
     subcarrier whose symbol lasts from one sample to the next.
@@ -116,27 +118,37 @@ def band(block: dict) -> dict:
     kind = waveform.get("kind")
     terms = set(waveform) - {"kind"}
     if kind not in TERMS or terms != TERMS[kind]:
-        expected = " or ".join(
-            f"{{{', '.join([f'kind: {name}', *sorted(TERMS[name])])}}}" for name in TERMS
-        )
-        raise InputError(f"network.waveform: {waveform}, expected {expected}")
+        known = []
+        for name, keys in TERMS.items():
+            listed = ", ".join([f"kind: {name}", *sorted(keys)])
+            known.append(f"{{{listed}}}")
+        raise InputError(f"network.waveform: {waveform}, expected {' or '.join(known)}")
     given = {key: block[key] for key in OFDM if key in block}
     if kind == "ofdm":
         return given
     if given:
         raise InputError(
-            f"network: {given} together with a waveform of kind {kind!r}, expected none of {list(OFDM)}"
+            f"network: {given} together with a waveform of kind {kind!r}, expected none of "
+            f"{list(OFDM)}"
         )
     interval_s = block.get("symbol_interval_s", math.inf)
     if kind == "cw":
-        return dict(zip(OFDM, (1, 1 / interval_s, 0), strict=True))
-    if waveform["sweep_s"] > interval_s:
-        raise InputError(
-            f"network.waveform: sweep_s is {waveform['sweep_s']:g}, expected at most symbol_interval_s, {interval_s:g}"
-        )
-    return dict(
-        zip(OFDM, (waveform["samples"], waveform["sweep_hz"] / waveform["samples"], 0), strict=True)
-    )
+        subcarriers = 1
+        spacing_hz = 1 / interval_s
+    else:
+        sweep_s = waveform["sweep_s"]
+        if sweep_s > interval_s:
+            raise InputError(
+                f"network.waveform: sweep_s is {sweep_s:g}, expected at most symbol_interval_s, "
+                f"{interval_s:g}"
+            )
+        subcarriers = waveform["samples"]
+        spacing_hz = waveform["sweep_hz"] / subcarriers
+    return {
+        "subcarriers": subcarriers,
+        "subcarrier_spacing_hz": spacing_hz,
+        "guard_subcarriers": 0,
+    }
 
 
 @dataclass(frozen=True)
@@ -198,32 +210,34 @@ class Network:
         block = {key: value for key, value in (block | band(block)).items() if key != "waveform"}
         if set(block) != keys:
             raise InputError(f"network: keys {sorted(set(block) ^ keys)} missing or unknown")
-        step = (block["subcarriers"] - 1 + block["guard_subcarriers"]) * block[
-            "subcarrier_spacing_hz"
-        ]
-        if step < 0:
+        spacing_hz = block["subcarrier_spacing_hz"]
+        step_hz = (block["subcarriers"] - 1 + block["guard_subcarriers"]) * spacing_hz
+        if step_hz < 0:
             raise InputError(
                 f"network: guard_subcarriers is {block['guard_subcarriers']}, expected at least "
                 f"{1 - block['subcarriers']}, at which all stations share one sub-band"
             )
-        stations = []
         names = station_names(block)
-        for index, name in enumerate(
-            name for name in names if "transmit" not in block["stations"][name]
-        ):
-            place = block["stations"][name]
-            position = tuple(float(value) for value in place["position_m"])
+        base_stations: dict[str, Station] = {}
+        for name in names:
+            settings = block["stations"][name]
+            if "transmit" in settings:
+                continue
+            position = tuple(float(value) for value in settings["position_m"])
             if len(position) != 3 or not all(map(math.isfinite, position)):
                 raise InputError(
-                    f"network: stations.{name}.position_m is {position}, expected three finite metres"
+                    f"network: stations.{name}.position_m is {position}, expected three finite "
+                    "metres"
                 )
-            normal = math.radians(place["normal_deg"])
-            stations.append(Station(name, position, normal, block["carrier_hz"] + index * step))
-        known = {station.name: station for station in stations}
-        stations += [
-            _link(name, block["stations"][name], known) for name in names if name not in known
-        ]
-        stations.sort(key=lambda station: station.name)
+            normal = math.radians(settings["normal_deg"])
+            lowest_hz = block["carrier_hz"] + len(base_stations) * step_hz
+            base_stations[name] = Station(name, position, normal, lowest_hz)
+        stations = []
+        for name in names:
+            if name in base_stations:
+                stations.append(base_stations[name])
+            else:
+                stations.append(_link(name, block["stations"][name], base_stations))
         return cls(
             carrier_hz=block["carrier_hz"],
             subcarrier_spacing_hz=block["subcarrier_spacing_hz"],
@@ -247,9 +261,8 @@ class Network:
         for station in self.stations:
             if station.name == name:
                 return station
-        raise InputError(
-            f"station {name!r}: not in the network, which has {[s.name for s in self.stations]}"
-        )
+        known = [station.name for station in self.stations]
+        raise InputError(f"station {name!r}: not in the network, which has {known}")
 
     @property
     def times_s(self) -> np.ndarray:
@@ -258,99 +271,110 @@ class Network:
 
     @property
     def symbol_rate_hz(self) -> float:
-        """One over the time that the samples of a symbol or sweep take (Hz): of OFDM the subcarrier
-        spacing.
-        """
-        return self.subcarrier_spacing_hz if self.sweep_s is None else 1 / self.sweep_s
+        """One over the time of the samples of a symbol or sweep (Hz); the spacing of OFDM."""
+        if self.sweep_s is None:
+            return self.subcarrier_spacing_hz
+        return 1 / self.sweep_s
 
     @property
     def bin_name(self) -> str:
-        """What a value of Eq. 24 belongs to, in words: a subcarrier, or a sample of an FMCW sweep
-        or of a carrier.
-        """
-        return "one subcarrier" if self.waveform == "ofdm" else "one sample"
+        """What a value of Eq. 24 belongs to, in words: a subcarrier, or a sample of other waves."""
+        if self.waveform == "ofdm":
+            return "one subcarrier"
+        return "one sample"
 
     @property
     def noise_bandwidth_hz(self) -> float:
-        """Noise bandwidth (Hz) of a value of Eq. 24: that of a subcarrier, or the sample rate of an
-        FMCW sweep.
-        """
-        return self.symbol_rate_hz * (1 if self.sweep_s is None else self.subcarriers)
+        """Noise bandwidth (Hz) of a value of Eq. 24: of a subcarrier, or a sweep's sample rate."""
+        if self.sweep_s is None:
+            return self.symbol_rate_hz
+        return self.symbol_rate_hz * self.subcarriers
 
     def effective_hz(self, station: Station) -> float:
-        """Return the effective carrier f_k + (M - 1) df / 2 (Hz): it determines phase and Doppler
-        in a range cell.
+        """Return the effective carrier f_k + (M - 1) df / 2 (Hz).
 
-        Source: paper, Eq. 7, the inverse transform over subcarriers.
+        It determines phase and Doppler in a range cell. Source: paper, Eq. 7, the inverse transform
+        over subcarriers.
         """
         return station.frequency_hz + (self.subcarriers - 1) * self.subcarrier_spacing_hz / 2
 
     def largest_mps(self, station: Station) -> float:
-        """Return c / (4 f T_r) (m/s), f the effective carrier: faster targets fold, because their
-        phase turns by more than half a circle per symbol."""
+        """Return the largest speed that does not fold, c / (4 f T_r) (m/s).
+
+        f is the effective carrier. The phase of faster targets turns by more than half a circle per symbol.
+        """
         return SPEED_OF_LIGHT / (4 * self.effective_hz(station) * self.symbol_interval_s)
 
     def folding(self, published: Iterable[dict]) -> str:
-        """Return a sentence where targets with these rows of the table of targets move faster than
-        speeds that fold here, with a symbol interval at which none does; else an empty text."""
+        """Return a sentence where targets move at speeds that fold here, else an empty text.
+
+        published: the targets' rows of the table of targets. The sentence names a symbol interval
+        at which no speed folds.
+        """
         columns = ("vx_abs_max", "vy_abs_max", "vz_abs_max", "speed_hi")
-        fastest = max(math.hypot(*(row[column] or 0.0 for column in columns)) for row in published)
+        fastest = 0.0
+        for row in published:
+            speeds = [row[column] or 0.0 for column in columns]
+            fastest = max(fastest, math.hypot(*speeds))
         largest = min(map(self.largest_mps, self.stations))
         interval_s = self.symbol_interval_s
         if fastest <= largest:
             return ""
         none_s = 0.95 * interval_s * largest / fastest
         return (
-            f"radial speeds beyond {largest:.3g} m/s fold, targets move at up to {fastest:.3g} m/s: "
-            f"network.symbol_interval_s is {interval_s:g}, at {none_s:.2g} none would fold"
+            f"radial speeds beyond {largest:.3g} m/s fold, targets move at up to {fastest:.3g} "
+            f"m/s: network.symbol_interval_s is {interval_s:g}, at {none_s:.2g} none would fold"
         )
 
     def range_folding(self, polygon_m: Iterable | None) -> str:
-        """Return a sentence where a range of the region of targets, of corners polygon_m (K, 2) or
-        None for the masts', is beyond the unambiguous one, c / (2 df), with a value at which none
-        is; else an empty text."""
-        masts = [station.position_m[:2] for station in self.stations if station.transmitter is None]
-        corners = np.array(masts if polygon_m is None else polygon_m, float)
-        ends = [
-            (station.transmitter or station, station.receiver or station)
-            for station in self.stations
-        ]
-        ways = [
-            [np.linalg.norm(corners - end.position_m[:2], axis=1) for end in pair] for pair in ends
-        ]
-        farthest = np.mean(ways, axis=1).max()
+        """Return a sentence where targets are beyond the unambiguous range, else an empty text.
+
+        polygon_m: corners (K, 2) of the region of targets, None for the polygon of the masts. The
+        unambiguous range is c / (2 df); the sentence names a value at which no range folds.
+        """
+        if polygon_m is None:
+            polygon_m = [
+                station.position_m[:2] for station in self.stations if station.transmitter is None
+            ]
+        corners = np.array(polygon_m, float)
+        ranges_m = []
+        for station in self.stations:
+            sends = station.transmitter or station
+            hears = station.receiver or station
+            out = np.linalg.norm(corners - sends.position_m[:2], axis=1)
+            back = np.linalg.norm(corners - hears.position_m[:2], axis=1)
+            ranges_m.append((out + back) / 2)
+        farthest = np.max(ranges_m)
         reach = self.subcarriers * self.cell_m
         if farthest <= reach:
             return ""
-        of_sweep = self.waveform == "fmcw"
-        key, value = (
-            ("waveform.samples", self.subcarriers)
-            if of_sweep
-            else (OFDM[1], self.subcarrier_spacing_hz)
-        )
-        none = (
-            math.ceil(value * farthest / reach)
-            if of_sweep
-            else math.floor(value * reach / farthest)
-        )
+        if self.waveform == "fmcw":
+            key = "waveform.samples"
+            value: float = self.subcarriers
+            none_folds = math.ceil(value * farthest / reach)
+        else:
+            key = "subcarrier_spacing_hz"
+            value = self.subcarrier_spacing_hz
+            none_folds = math.floor(value * reach / farthest)
         return (
-            f"ranges beyond {reach:.4g} m fold, targets are up to {farthest:.4g} m from a station: network.{key} is "
-            f"{value:g}, at {none} none would fold, nor in a smaller motion.region or with stations closer together"
+            f"ranges beyond {reach:.4g} m fold, targets are up to {farthest:.4g} m from a station: "
+            f"network.{key} is {value:g}, at {none_folds} none would fold, nor in a smaller "
+            "motion.region or with stations closer together"
         )
 
     def folded_mps(self, speed_mps: np.ndarray, station: Station) -> np.ndarray:
-        """Return the speeds (m/s, any shape) at which a station sees radial speeds, above -largest
-        to largest.
+        """Return the speeds (m/s, any shape) at which a station sees radial speeds.
+
+        They are above -largest and up to largest.
         """
         largest = self.largest_mps(station)
         return largest - (largest - speed_mps) % (2 * largest)
 
     def bin_speeds_mps(self, points: int, station: Station) -> np.ndarray:
-        """Return the radial speeds (points,) m/s, ascending, positive receding, of a Fourier
-        transform over symbols.
+        """Return the radial speeds (points,) m/s of a Fourier transform over symbols, ascending.
 
-        Bin k of `numpy.fft.fftfreq` is the speed -2 k / points times the largest: an echo that
-        recedes turns backwards.
+        Positive speeds recede. Bin k of `numpy.fft.fftfreq` is the speed -2 k / points times the
+        largest: an echo that recedes turns backwards.
         """
         return -2 * self.largest_mps(station) * np.fft.fftshift(np.fft.fftfreq(points))[::-1]
 

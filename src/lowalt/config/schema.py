@@ -1,5 +1,4 @@
-"""Checks settings against a JSON schema, with one sentence per fault; also settings in untrusted
-files.
+"""Checks settings, also of untrusted files, against a JSON schema, with one sentence per fault.
 
 Numbers are finite and integers are written as such (no 8.0) and fit 64 bits; `const: inf` also
 accepts an infinity; text that a pattern describes has no control characters, so that it can be
@@ -50,9 +49,7 @@ def _pattern(
 def _const(
     validator: Any, wanted: object, value: object, schema: dict
 ) -> Iterator[jsonschema.ValidationError]:
-    """Refuse what differs from the one value; the text inf stands for an infinity, which JSON has
-    not.
-    """
+    """Refuse what differs from the one value; "inf" stands for an infinity, which JSON lacks."""
     if wanted != "inf" or value != math.inf:
         yield from jsonschema.Draft202012Validator.VALIDATORS["const"](
             validator, wanted, value, schema
@@ -77,27 +74,31 @@ COUNTS = ("minProperties", "maxProperties")
 """Rules of a schema on the number of a block's keys."""
 
 
-def plain(value: object) -> object:
+def plain(value: Any) -> Any:
     """Return checked settings with infinities as the text "inf", which JSON has not as a number."""
     if isinstance(value, dict):
         return {key: plain(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
         return [plain(item) for item in value]
-    return str(value) if isinstance(value, float) and not math.isfinite(value) else value
+    if isinstance(value, float) and not math.isfinite(value):
+        return str(value)
+    return value
 
 
 def _innermost(errors: Iterable[Any]) -> Iterator[Any]:
     """The innermost errors, such as those within each of several choices."""
     for error in errors:
-        yield from _innermost(error.context) if error.context else (error,)
+        if error.context:
+            yield from _innermost(error.context)
+        else:
+            yield error
 
 
 def with_numbers(settings: Any, schema: dict) -> Any:
-    """Return settings that people write in YAML, their numbers read as meant; nested values change
-    in place.
+    """Return settings that people write in YAML, their numbers read as meant.
 
-    Where a schema expects a number and no text, a text such as 28e9 is one; where it expects an
-    integer, so is 4.0e+2.
+    Nested values change in place. Where a schema expects a number and no text, a text such as 28e9
+    is one; where it expects an integer, so is 4.0e+2.
     """
     held: Any = [settings]
     for error in _innermost([*Validator(schema).iter_errors(settings)]):
@@ -105,16 +106,18 @@ def with_numbers(settings: Any, schema: dict) -> Any:
             continue
         value = error.instance
         wanted = error.validator_value
-        kinds = {wanted} if isinstance(wanted, str) else {*wanted}
+        if isinstance(wanted, str):
+            wanted = [wanted]
+        kinds = set(wanted)
         if isinstance(value, str) and NUMBER.fullmatch(value):
             value = float(value)
         if isinstance(value, float) and "integer" in kinds - {"number"} and value.is_integer():
             value = int(value)
-        if value is not error.instance and any(
-            Validator.TYPE_CHECKER.is_type(value, kind) for kind in kinds
-        ):
-            way = [0, *error.absolute_path]
-            functools.reduce(operator.getitem, way[:-1], held)[way[-1]] = value
+        fits = any(Validator.TYPE_CHECKER.is_type(value, kind) for kind in kinds)
+        if value is not error.instance and fits:
+            path: list[Any] = [0, *error.absolute_path]
+            above = functools.reduce(operator.getitem, path[:-1], held)
+            above[path[-1]] = value
     return held[0]
 
 
@@ -124,16 +127,15 @@ def _expected(error: Any) -> str:
     wanted = error.validator_value
     if rule == "oneOf":
         # For a number out of range state the range, otherwise the expected types.
-        ranges = [choice for choice in error.context if choice.validator not in ("type", "const")]
-        return (
-            _expected(ranges[0])
-            if ranges
-            else " or ".join(str(one.get("const", one.get("type"))) for one in wanted)
-        )
+        for choice in error.context:
+            if choice.validator not in ("type", "const"):
+                return _expected(choice)
+        return " or ".join(str(one.get("const", one.get("type"))) for one in wanted)
     if rule == "dependentRequired":
-        return " together with ".join(
-            next([key, *others] for key, others in wanted.items() if key in error.instance)
-        )
+        key = next(key for key in wanted if key in error.instance)
+        return " together with ".join([key, *wanted[key]])
+    if rule == "not" and isinstance(wanted, dict):
+        return f"none of {wanted.get('enum')}"
     words = {
         "type": f"type {wanted}",
         "minimum": f"at least {wanted}",
@@ -147,9 +149,12 @@ def _expected(error: Any) -> str:
         "maxProperties": f"at most {wanted} key(s)",
         "uniqueItems": "every item once",
         "pattern": f"text like {wanted}",
-        "not": f"none of {wanted.get('enum')}" if isinstance(wanted, dict) else "",
     }
-    return words.get(str(rule), error.message if len(error.message) <= 200 else "another value")
+    if rule in words:
+        return words[rule]
+    if len(error.message) > 200:
+        return "another value"
+    return error.message
 
 
 def _fault(error: Any) -> str:
@@ -159,26 +164,28 @@ def _fault(error: Any) -> str:
         unknown = [name for name in error.instance if name not in known]
         return f"unknown key(s) {shown(unknown)}, expected {instead(unknown, known)}"
     if error.validator == "required":
-        return f"missing key(s) {[name for name in error.validator_value if name not in error.instance]}"
-    meaning = error.schema.get("description", "") if isinstance(error.schema, dict) else ""
-    return f"value {shown(error.instance)}, expected {_expected(error)}" + f" ({meaning})" * bool(
-        meaning
-    )
+        missing = [name for name in error.validator_value if name not in error.instance]
+        return f"missing key(s) {missing}"
+    text = f"value {shown(error.instance)}, expected {_expected(error)}"
+    if isinstance(error.schema, dict) and error.schema.get("description"):
+        text += f" ({error.schema['description']})"
+    return text
 
 
 def faults(settings: object, schema: dict, whole: str = "configuration") -> list[str]:
-    """Return one line per fault of settings against a JSON schema: key, value and what was
-    expected.
+    """Return one line per fault of settings against a schema: key, value and the expected value.
 
     whole: name of the checked settings. If several items of a list have the same fault, the first
     is named.
     """
+
+    def order(error: Any) -> tuple:
+        """By key; a fault of a block's number of keys comes after the block's other faults."""
+        return [*map(str, error.absolute_path)], error.validator in COUNTS
+
     lines: dict[tuple, str] = {}
-    errors = Validator(schema).iter_errors(settings)
-    for error in sorted(
-        errors, key=lambda error: ([*map(str, error.absolute_path)], error.validator in COUNTS)
-    ):
-        block = tuple(part for part in error.absolute_path if isinstance(part, str))
+    for error in sorted(Validator(schema).iter_errors(settings), key=order):
+        block = tuple(name for name in error.absolute_path if isinstance(name, str))
         # If a block has another fault, do not report its number of keys.
         if error.validator not in COUNTS or not any(other[:-1] == block for other in lines):
             key = ".".join(map(str, error.absolute_path)) or whole
@@ -187,8 +194,7 @@ def faults(settings: object, schema: dict, whole: str = "configuration") -> list
 
 
 def with_extensions(path: str | Path) -> dict:
-    """Return the schema of the configuration in a file, with the effects and spectra of extensions
-    as further keys.
+    """Return the schema of the configuration in a file, with the extensions' effects and spectra.
 
     The modules of extensions check their own settings.
     """
@@ -202,29 +208,27 @@ def with_extensions(path: str | Path) -> dict:
 
 @functools.cache
 def _brought() -> dict:
-    """The schema of settings in files, together with the configuration's schema, with which it
-    shares blocks.
-    """
+    """The schema of settings in files, with the configuration's, with which it shares blocks."""
     return {
         **load_yaml(BROUGHT)["$defs"],
         "config": with_extensions(SHIPPED / "workflow/schemas/config.schema.yaml"),
     }
 
 
-def of_brought(part: str) -> dict:
+def of_brought(definition: str) -> dict:
     """Return the schema of a definition of `brought.schema.yaml`."""
-    return {"$ref": f"#/$defs/{part}", "$defs": _brought()}
+    return {"$ref": f"#/$defs/{definition}", "$defs": _brought()}
 
 
-def check_brought(part: str, settings: object, where: str | Path) -> None:
+def check_brought(definition: str, settings: object, where: str | Path) -> None:
     """Refuse wrong settings of a file before they are used.
 
-    part: a definition of `brought.schema.yaml`; where: the file.
+    definition: one of `brought.schema.yaml`; where: the file.
     Raises: InputError naming the file, the first key that is wrong, its value and what was
     expected.
     """
     try:
-        lines = faults(settings, of_brought(part), part)
+        lines = faults(settings, of_brought(definition), definition)
     except RecursionError:
         raise InputError(
             f"{where}: values stand in each other too deeply, expected a few levels"

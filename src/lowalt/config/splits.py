@@ -16,8 +16,10 @@ WAYS = ("motion", "sample")
 
 @functools.lru_cache(maxsize=65536)
 def _block(shares: tuple[int, int, int], seed: int, keys: tuple, number: int) -> tuple[str, ...]:
-    """Folds of the models in one block, by their place in it."""
-    names = [name for name, share in zip(FOLDS, shares, strict=True) for _ in range(share)]
+    """Folds of the models in one block, by their position in it."""
+    names: list[str] = []
+    for name, share in zip(FOLDS, shares, strict=True):
+        names += [name] * share
     order = stream(seed, "fold", *keys, number).permutation(len(names))
     return tuple(names[index] for index in order)
 
@@ -34,7 +36,8 @@ def fold(split: dict, seed: int, subtype: str, model: int, snr_db: float | None 
     shares = tuple(split[name] for name in FOLDS)
     if any(not isinstance(share, int) or share < 0 for share in shares) or shares[0] < 1:
         raise InputError(
-            f"split: shares {dict(zip(FOLDS, shares, strict=True))}, expected whole numbers, train >= 1"
+            f"split: shares {dict(zip(FOLDS, shares, strict=True))}, expected whole numbers, "
+            "train >= 1"
         )
     if split["by"] == "motion":
         keys: tuple[str, ...] = (subtype,)

@@ -1,6 +1,4 @@
-"""The echo: the signal that a base station receives from moving scattering points, exactly or to a
-tolerance.
-"""
+"""The echo: the signal that a station receives from moving points, exact or within a tolerance."""
 
 from lowalt.echo.api import EchoResult, echo_signal, echo_signals
 from lowalt.echo.echo_input import Rigid

@@ -1,5 +1,6 @@
-"""Command line of the echo stage: a chunk's motion table and clouds -> clean signals, one file per
-station.
+"""Command line of the echo stage: a chunk's motion table and clouds -> clean signals.
+
+It writes one file per station.
 """
 
 import sys

@@ -6,7 +6,7 @@ import numpy as np
 
 from lowalt.config.network import Network, Station
 from lowalt.echo import refine
-from lowalt.echo.echo_input import EchoInput, Rigid, Target, check, target
+from lowalt.echo.echo_input import EchoInput, Rigid, Target, check, named, target
 from lowalt.echo.pointwise import results
 from lowalt.echo.pointwise.reference_range import reference
 from lowalt.echo.pointwise.terms import aim_cosines
@@ -73,7 +73,8 @@ def echo_signal(
         fault = results.bounded(scene, radio, refs, left, aims, method.pointwise_bound, found)
         check_fault(fault, scene, station, sample)
     if tolerance is None:
-        method = method._replace(again=nearest.correct(seen, refs, found, method.pointwise_bound))
+        recomputed = nearest.correct(seen, refs, found, method.pointwise_bound)
+        method = method._replace(again=recomputed)
     largest = float(abs(found.values).max())
     worst = float(found.bounds.max())
     bound = np.inf if worst > 0 else 0.0
@@ -81,7 +82,7 @@ def echo_signal(
         bound = worst / largest
     if tolerance is not None and not bound <= tolerance:
         raise BelowFloor(
-            f"{_named(sample)}tolerance is {tolerance}, below the floor of this sample: float64 "
+            f"{named(sample)}tolerance is {tolerance}, below the floor of this sample: float64 "
             f"promises {bound:.1e} of its largest value, expected a larger tolerance or null"
         )
     return EchoResult(
@@ -109,17 +110,12 @@ def echo_signals(
     return np.stack(signals)
 
 
-def _named(sample: str) -> str:
-    """The sample's name as the start of a message."""
-    return f"{sample}: " if sample else ""
-
-
 def _check_tolerance(tolerance, sample: str) -> None:
     """Raise InputError unless the tolerance is None or a number between 0 and 1."""
     good = tolerance is None or (isinstance(tolerance, (int, float)) and 0 < tolerance < 1)
     if not good:
         raise InputError(
-            f"{_named(sample)}tolerance is {tolerance!r}, expected null or a number between 0 and 1"
+            f"{named(sample)}tolerance is {tolerance!r}, expected null or a number between 0 and 1"
         )
 
 
@@ -130,12 +126,12 @@ def prepared(network, station, motion, rcs_m2, aim_m, sample):
     """
     if station.transmitter is not None:
         raise InputError(
-            f"{_named(sample)}station {station.name} is a link between two stations, expected a "
+            f"{named(sample)}station {station.name} is a link between two stations, expected a "
             "station that hears itself; only scenes with effects have links"
         )
     scene = check(network, station, motion, rcs_m2, aim_m, sample)
     radio = radar(network, station)
-    refs = reference(scene.translation[:, scene.part[0] if len(scene.part) else 0], radio)
+    refs = reference(scene.translation[:, scene.first], radio)
     aims = aim_cosines(scene.aim, radio.station, radio.sine, radio.cosine)
     return scene, radio, refs, aims
 
@@ -145,10 +141,11 @@ def check_fault(fault: int, scene: EchoInput, station: Station, sample: str) -> 
 
     A kernel reports it as `fault` = 1 + n L + l, and none as 0.
     """
-    if fault:
-        points = len(scene.part) or scene.translation.shape[1]
-        n, l = divmod(fault - 1, points)  # noqa: E741
-        raise InputError(
-            f"{_named(sample)}position of point {l} at symbol {n} is {station.position_m}, the "
-            f"place of station {station.name} (r = 0), expected r > 0"
-        )
+    if not fault:
+        return
+    points = len(scene.part) or scene.translation.shape[1]
+    symbol, point = divmod(fault - 1, points)
+    raise InputError(
+        f"{named(sample)}position of point {point} at symbol {symbol} is {station.position_m}, "
+        f"the place of station {station.name} (r = 0), expected r > 0"
+    )

@@ -19,8 +19,9 @@ def clean_signals(
     rows: list[dict],
     tolerance: float | None,
 ) -> np.ndarray:
-    """Return clean signals (stations, models, N) complex64 of the motion table `rows` at the
-    stations `names`.
+    """Return clean signals (stations, models, N) complex64 at the stations `names`.
+
+    rows: of the motion table.
 
     The beams aim at each cloud's origin at the first symbol.
     Raises: InputError naming the sample where a subtype has no cloud or a position cannot be
@@ -32,13 +33,11 @@ def clean_signals(
     for index, row in enumerate(reported(rows, len(rows), "models")):
         sample = f"{row['subtype']}, model {row['model']}"
         cloud = cloud_of(clouds, row)
-        seen = target(
-            Rigid(*poses(cloud, row, times_s), cloud.points, cloud.part), cloud.rcs_m2, sample
-        )
+        motion = Rigid(*poses(cloud, row, times_s), cloud.points, cloud.part)
+        seen = target(motion, cloud.rcs_m2, sample)
         aim = np.array([row["x_m"], row["y_m"], row["z_m"]])
-        for place, station in enumerate(stations):
+        for number, station in enumerate(stations):
             where = f"{sample}, station {station.name}"
-            result[place, index] = echo_signal(
-                network, station, seen, None, aim, tolerance, sample=where
-            ).signal
+            echo = echo_signal(network, station, seen, None, aim, tolerance, sample=where)
+            result[number, index] = echo.signal
     return result

@@ -55,6 +55,18 @@ class EchoInput(NamedTuple):
     rcs_m2: np.ndarray
     aim: np.ndarray
 
+    @property
+    def first(self) -> int:
+        """The part whose translation is the reference; without rotations, the point."""
+        if len(self.part) == 0:
+            return 0
+        return int(self.part[0])
+
+
+def named(sample: str) -> str:
+    """Return the sample's name as the start of a message."""
+    return f"{sample}: " if sample else ""
+
 
 def _float(name: str, value, shape: tuple[int | str, ...], sample: str) -> np.ndarray:
     """Return `value` as contiguous float64 of this shape, where a letter is any size >= 1."""
@@ -77,7 +89,9 @@ def _float(name: str, value, shape: tuple[int | str, ...], sample: str) -> np.nd
             "number"
         )
     # Copy a read-only array, because numba would compile the kernels a second time for it.
-    return array if array.flags.writeable else array.copy()
+    if not array.flags.writeable:
+        return array.copy()
+    return array
 
 
 def target(motion: Rigid | np.ndarray, rcs_m2: np.ndarray | float, sample: str = "") -> Target:
@@ -89,7 +103,7 @@ def target(motion: Rigid | np.ndarray, rcs_m2: np.ndarray | float, sample: str =
     Raises: InputError naming the argument, its value and the sample for NaN, infinite, empty or
     wrongly shaped input, and for a negative cross section.
     """
-    where = f"{sample}: " if sample else ""
+    where = named(sample)
     if isinstance(motion, Rigid):
         rotation = _float("motion.rotation", motion.rotation, ("N", "P", 3, 3), where)
         symbols, parts = rotation.shape[:2]
@@ -130,7 +144,7 @@ def check(network: Network, station: Station, motion, rcs_m2, aim_m, sample: str
     Raises: as `target`, and InputError for cross sections given twice or an aim at the station
     itself.
     """
-    where = f"{sample}: " if sample else ""
+    where = named(sample)
     if isinstance(motion, Target):
         if rcs_m2 is not None:
             raise InputError(

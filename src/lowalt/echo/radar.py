@@ -31,8 +31,9 @@ class Exact(NamedTuple):
     """kappa / 2: half turns of array phase per element and unit of direction cosine."""
     phase_h: Pair
     phase_v: Pair
-    """Turns of phase of both arrays' middles per unit of the horizontal and vertical direction
-    cosine.
+    """Turns of phase of both arrays' middles.
+
+    The turns are per unit of the horizontal and vertical direction cosine.
     """
     scale: Pair
     """a0 lambda / (4 pi)^(3/2)."""
@@ -80,8 +81,10 @@ class Radar(NamedTuple):
     bandwidth_hz: float
     """M df (Hz): range cells per second of delay."""
     exact: np.ndarray
-    """(8, 2), the constants as double-doubles in the order of `Exact`. Compiled code takes one
-    array faster than eight pairs; `constants` unpacks it."""
+    """(8, 2), the constants as double-doubles in the order of `Exact`.
+
+    Compiled code takes one array faster than eight pairs; `constants` unpacks it.
+    """
 
 
 @lru_cache(maxsize=64)
@@ -116,19 +119,21 @@ def radar(network: Network, station: Station) -> Radar:
     )
     exact = Exact(*map(pair, numbers))
     return Radar(
-        np.array(station.position_m, dtype=np.float64),
-        exact.sine[0],
-        exact.cosine[0],
-        *exact.turns,
-        *exact.cells,
-        station.frequency_hz / network.carrier_hz,
-        int(transmit_h),
-        int(transmit_v),
-        int(receive_h),
-        int(receive_v),
-        int(network.subcarriers),
-        exact.scale[0],
-        float(centre),
-        float(bandwidth),
-        np.array(exact),
+        station=np.array(station.position_m, dtype=np.float64),
+        sine=exact.sine[0],
+        cosine=exact.cosine[0],
+        turns=exact.turns[0],
+        turns_lo=exact.turns[1],
+        cells=exact.cells[0],
+        cells_lo=exact.cells[1],
+        kappa=station.frequency_hz / network.carrier_hz,
+        transmit_h=int(transmit_h),
+        transmit_v=int(transmit_v),
+        receive_h=int(receive_h),
+        receive_v=int(receive_v),
+        subcarriers=int(network.subcarriers),
+        scale=exact.scale[0],
+        centre_hz=float(centre),
+        bandwidth_hz=float(bandwidth),
+        exact=np.array(exact),
     )

@@ -1,6 +1,4 @@
-"""Keeps a tolerance: bound the error, compute, compare, and recompute more precisely where terms
-cancel.
-"""
+"""Keeps a tolerance: bound the error, compute, compare, and recompute where terms cancel."""
 
 from typing import NamedTuple
 
@@ -20,12 +18,14 @@ from lowalt.echo.radar import Radar
 LONGEST = 100
 """Largest number of symbols in a segment."""
 PROBES = 8
-"""Number of symbols computed exactly first; their largest value is a lower bound of the sample's
-largest value.
+"""Number of symbols computed exactly first.
+
+Their largest value is a lower bound of the sample's largest value.
 """
 PROBE_COST = 20_000
-"""Cost of the probes and of a second pass, in points x symbols of the exact plan. A cheaper plan
-must save more.
+"""Cost of the probes and of a second pass, in points x symbols of the exact plan.
+
+A cheaper plan must save more.
 """
 SAVED_SINGLE = 0.4
 SAVED = 0.1
@@ -36,8 +36,7 @@ class Method(NamedTuple):
     """Record of how a sample was computed and which error bounds were proved.
 
     single: float32 after the phase; orders: polynomial orders of cosine, sine and the cell kernel;
-    cheap, exact,
-    general: symbols by the cheap plan, by the exact plan and by the pointwise kernel;
+    cheap, exact, general: symbols by the cheap plan, by the exact plan and by the pointwise kernel;
     pointwise_bound: error bound of the pointwise kernel relative to its sums of amplitudes and of
     risks; again: number of symbols recomputed for correct rounding to complex64, and how many of
     them remain undecided.
@@ -95,7 +94,10 @@ def compute(
 def _least_largest(found: Found) -> float:
     """Return a lower bound of the largest true |value|, given the error bounds."""
     done = found.state == CERTAIN
-    return float((abs(found.values) - found.bounds)[done].max()) if done.any() else 0.0
+    if not done.any():
+        return 0.0
+    least = abs(found.values[done]) - found.bounds[done]
+    return float(least.max())
 
 
 class _Run:
@@ -105,8 +107,7 @@ class _Run:
         self, scene: EchoInput, radar: Radar, refs: np.ndarray, aims: tuple[float, float]
     ) -> None:
         peak = radar.scale * radar.transmit_h * radar.transmit_v * radar.receive_h * radar.receive_v
-        first = int(scene.part[0]) if len(scene.part) else 0
-        self.sample = EchoSample(scene, layout(scene, peak), radar, first, aims)
+        self.sample = EchoSample(scene, layout(scene, peak), radar, scene.first, aims)
         self.refs = refs
         self.points = len(self.sample.lay.amplitude)
         self.extents = np.empty((len(refs), 5))
@@ -124,14 +125,16 @@ class _Run:
 
     def saving(self, tolerance: float) -> float:
         """Return the cost that a tolerance may save, in points x symbols of the exact plan."""
-        single = 0.5 * tolerance > error_model.SINGLE_ERROR
-        return (SAVED_SINGLE if single else SAVED) * len(self.refs) * self.points
+        share = SAVED
+        if 0.5 * tolerance > error_model.SINGLE_ERROR:
+            share = SAVED_SINGLE
+        return share * len(self.refs) * self.points
 
     def cells(self, chosen: error_model.EchoPlan) -> CellPolynomials | None:
         """Return the cell kernels of a plan; None if the target extends over too many cells."""
         radar = self.sample.radar
-        cells = error_model.round_up(self.size_m * radar.cells, 6)
-        return cell_polynomials(radar.subcarriers, cells, chosen.fit)
+        deep = error_model.round_up(self.size_m * radar.cells, 6)
+        return cell_polynomials(radar.subcarriers, deep, chosen.fit)
 
     def compute(
         self, symbols: np.ndarray, chosen: error_model.EchoPlan, final: bool, found: Found

@@ -1,1 +1,1 @@
-"""File access for all stages: atomic writing, strict readers, and error messages of one sentence."""
+"""File access for all stages: atomic writing, strict readers, errors of one sentence."""

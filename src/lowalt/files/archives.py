@@ -42,10 +42,11 @@ def write_arrays(path: str | Path, arrays: Mapping[str, np.ndarray]) -> None:
         for name, array in arrays.items():
             data = _member(array)
             inner = f"{name}.npy".encode("ascii")
-            place = file.tell()
-            if place + len(data) > _LARGEST:
+            offset = file.tell()
+            if offset + len(data) > _LARGEST:
                 raise InputError(
-                    f"{path}: {name} would make the file longer than {_LARGEST} bytes, expected less"
+                    f"{path}: {name} would make the file longer than {_LARGEST} bytes, expected "
+                    "less"
                 )
             crc = zlib.crc32(data)
             long = 2**32 - 1
@@ -84,7 +85,7 @@ def write_arrays(path: str | Path, arrays: Mapping[str, np.ndarray]) -> None:
                 0,
                 0,
             )
-            listed.append(struct.pack("<4s4B4H3I5H2I", b"PK\1\2", *entry, _MODE, place) + inner)
+            listed.append(struct.pack("<4s4B4H3I5H2I", b"PK\1\2", *entry, _MODE, offset) + inner)
         start = file.tell()
         size = sum(map(len, listed))
         file.write(b"".join(listed))

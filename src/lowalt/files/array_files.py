@@ -1,7 +1,6 @@
-"""Files of arrays (.npy, .npz) from users: the errors that damaged files raise, and limits of their
-stated size.
-"""
+"""Files of arrays (.npy, .npz) from users: errors of damaged files, limits of their stated size."""
 
+import math
 import struct
 import sys
 import tokenize
@@ -48,7 +47,10 @@ def array_of(path: str | Path, what: str, mapped: bool = False) -> np.ndarray:
     """
     path = existing(path, what)
     try:
-        array = np.load(path, mmap_mode="r" if mapped else None, allow_pickle=False)
+        # A map first: its size is compared with that of the file before memory is asked for.
+        array = np.load(path, mmap_mode="r", allow_pickle=False)
+        if not mapped and isinstance(array, np.memmap):
+            array = np.array(array)
     except UNREADABLE as error:
         raise InputError(f"{path}: not a whole {what} file ({error})") from error
     if not isinstance(array, np.ndarray):
@@ -57,8 +59,7 @@ def array_of(path: str | Path, what: str, mapped: bool = False) -> np.ndarray:
 
 
 def checked_archive(path: str | Path, what: str) -> Path:
-    """Return the path of a .npz whose members are arrays of plausible sizes, and whose texts are
-    texts.
+    """Return the path of a .npz whose members are arrays of plausible sizes, its texts valid.
 
     Raises: InputError naming the file where it is missing, is no archive, or has a member that
     would fill the memory, is not an array (NumPy would return bytes), or holds invalid characters
@@ -67,36 +68,50 @@ def checked_archive(path: str | Path, what: str) -> Path:
     path = existing(path, what)
     try:
         with zipfile.ZipFile(path) as archive:
-            large = next((member for member in archive.infolist() if _expands(member)), None)
-            for member in archive.infolist() if large is None else ():
-                with archive.open(member) as file:
-                    _check_array(file)
+            members = archive.infolist()
+            large = next((member for member in members if _expands(member)), None)
+            total = sum(member.file_size for member in members)
+            whole = total <= most_expanded(path.stat().st_size)
+            if large is None and whole:
+                for member in members:
+                    with archive.open(member) as file:
+                        _check_array(file, member.file_size)
     except UNREADABLE as error:
         raise InputError(f"{path}: not a {what} file ({error})") from error
     if large:
         raise InputError(
-            f"{path}: {large.filename} says that {large.compress_size} bytes expand to {large.file_size}, "
-            f"expected at most {MOST_EXPANSION} times as many"
+            f"{path}: {large.filename} says that {large.compress_size} bytes expand to "
+            f"{large.file_size}, expected at most {MOST_EXPANSION} times as many"
+        )
+    if not whole:
+        raise InputError(
+            f"{path}: {len(members)} members of {total} bytes in all, expected at most "
+            f"{MOST_EXPANSION} times as many as the file has"
         )
     return path
 
 
+def most_expanded(size: int) -> int:
+    """Return how many bytes a compressed file or member of `size` bytes may expand to."""
+    return max(FREE_BYTES, MOST_EXPANSION * size)
+
+
 def _expands(member: zipfile.ZipInfo) -> bool:
     """Whether the stated size of an archive's member would fill the memory."""
-    return member.file_size > max(FREE_BYTES, MOST_EXPANSION * member.compress_size)
+    return member.file_size > most_expanded(member.compress_size)
 
 
-def _check_array(file: IO[bytes]) -> None:
-    """Read the header of a .npy file, and its characters where it holds text. Raises: errors of
-    UNREADABLE.
+def _check_array(file: IO[bytes], size: int) -> None:
+    """Read the header of a .npy file of `size` bytes, and its characters where it holds text.
+
+    Raises: errors of UNREADABLE.
     """
-    version = np.lib.format.read_magic(file)
-    header = (
-        np.lib.format.read_array_header_1_0
-        if version == (1, 0)
-        else np.lib.format.read_array_header_2_0
-    )
-    dtype = header(file)[2]
+    if np.lib.format.read_magic(file) == (1, 0):
+        shape, _, dtype = np.lib.format.read_array_header_1_0(file)
+    else:
+        shape, _, dtype = np.lib.format.read_array_header_2_0(file)
+    if math.prod(shape) * dtype.itemsize > size:
+        raise ValueError(f"an array {shape} of {dtype} is longer than its {size} bytes")
     if dtype.kind == "U":
         codes = np.frombuffer(file.read(), np.dtype("u4").newbyteorder(dtype.byteorder))
         if codes.max(initial=0) > sys.maxunicode:

@@ -1,9 +1,10 @@
-"""Atomic writing of files, checksums, and plain file names."""
+"""Atomic writing of files, opening of files from users, checksums, and plain file names."""
 
 import contextlib
 import csv
 import errno
 import hashlib
+import io
 import os
 import re
 import shutil
@@ -23,8 +24,7 @@ full disk.
 
 @contextlib.contextmanager
 def replacing(path: str | Path, size: int | None = None) -> Iterator[Path]:
-    """Yield a temporary path next to `path` that replaces it only if the block ends without an
-    error.
+    """Yield a temporary path next to `path`, which replaces it if the block ends without an error.
 
     size: minimum size of the file (bytes), if known before it is written.
     Raises: SpaceError naming the file, the size and the free space where the disk is too small or
@@ -47,11 +47,10 @@ def replacing(path: str | Path, size: int | None = None) -> Iterator[Path]:
         if not _is_full(error, path):
             raise
         written = temporary.stat().st_size if temporary.exists() else 0
-        needed = (
-            f"{_megabytes(size)}"
-            if size is not None
-            else f"more than the {_megabytes(written)} written so far"
-        )
+        if size is None:
+            needed = f"more than the {_megabytes(written)} written so far"
+        else:
+            needed = _megabytes(size)
         free = _megabytes(free_bytes(path) + written)
         raise SpaceError(
             f"{path}: the disk is full; the file needs {needed}, {free} are free without it"
@@ -64,8 +63,10 @@ def replacing(path: str | Path, size: int | None = None) -> Iterator[Path]:
 
 def write_file(path: str | Path, content: str | bytes) -> None:
     """Write a whole file by `replacing`, text in UTF-8."""
+    if isinstance(content, str):
+        content = content.encode()
     with replacing(path) as temporary:
-        temporary.write_bytes(content.encode() if isinstance(content, str) else content)
+        temporary.write_bytes(content)
 
 
 def _sweep(path: Path) -> None:
@@ -79,8 +80,9 @@ def _sweep(path: Path) -> None:
 
 
 def free_bytes(path: str | Path) -> int:
-    """Return the bytes that this user may still write on the disk of `path`, which itself need not
-    exist.
+    """Return the bytes that this user may still write on the disk of `path`.
+
+    The path itself need not exist.
     """
     path = Path(path).absolute()
     while not path.exists():
@@ -108,47 +110,107 @@ def sha256(path: str | Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def existing(path: str | Path, what: str) -> Path:
-    """Return `path` as a Path.
+MOST_TEXT_BYTES = 64 << 20
+"""Largest size of a text that is read as a whole; what Python makes of it takes some ten times as
+much memory.
+"""
+MOST_TABLE_BYTES = 512 << 20
+"""Largest size of a text that is read line by line."""
+LONGEST_LINE = 1 << 20
+"""Largest number of characters of a line."""
 
-    Raises: InputError naming `what` and the path where there is no such file, or the name is not
-    valid.
+
+def existing(path: str | Path, what: str, most_bytes: int | None = None) -> Path:
+    """Return `path` as a Path; every reader of a file from a user calls this before it opens it.
+
+    most_bytes: largest size of the file, None for any.
+    Raises: InputError naming `what` and the path where there is no such file, the name is not
+    valid, it is no regular file (a pipe would never end), or larger.
     """
     path = Path(path)
     try:
         there = path.is_file()
+        other = path.exists() and not path.is_dir()
     except OSError as error:
         raise InputError(f"{what}: no file at {path} ({error.strerror})") from error
+    except ValueError:
+        there = other = False  # a null byte in the name
+    if not there and other:
+        raise InputError(f"{what}: {path} is a pipe, socket or device, expected a regular file")
     if not there:
         raise InputError(f"{what}: no file at {path}")
+    size = path.stat().st_size
+    if most_bytes is not None and size > most_bytes:
+        raise InputError(f"{path}: {size} bytes, expected a {what} of at most {most_bytes}")
     return path
 
 
-@contextlib.contextmanager
-def text_file(path: str | Path, what: str) -> Iterator[TextIO]:
-    """Yield a file opened as UTF-8 text, with or without a byte order mark; line ends are left as
-    they are.
+def bytes_of(path: str | Path, what: str, most_bytes: int) -> bytes:
+    """Return the bytes of a file of at most `most_bytes`.
 
-    Raises: InputError naming `what` and the path where there is no such file, it is no UTF-8, or no
-    CSV where it is read as CSV.
+    Raises: InputError as `existing`, and where the file has more bytes than its size says, as those
+    of /proc have.
     """
+    path = existing(path, what, most_bytes)
+    size = path.stat().st_size
+    with path.open("rb") as file:
+        data = file.read(size + 1)
+    if len(data) > size:
+        raise InputError(f"{path}: longer than the {size} bytes of its size, expected a whole file")
+    return data
+
+
+class _Lines(io.TextIOWrapper):
+    """A text whose lines are bounded: one that never ends would fill the memory."""
+
+    def __next__(self) -> str:  # type: ignore[override]
+        """Return the next line. Raises: InputError naming the file for a longer one."""
+        line = self.readline(LONGEST_LINE + 1)
+        if not line:
+            raise StopIteration
+        if len(line) > LONGEST_LINE:
+            raise InputError(
+                f"{self.name}: a line of more than {LONGEST_LINE} characters, expected shorter ones"
+            )
+        return line
+
+
+@contextlib.contextmanager
+def text_file(
+    path: str | Path, what: str, most_bytes: int = MOST_TABLE_BYTES, errors: str = "strict"
+) -> Iterator[TextIO]:
+    """Yield a file opened as UTF-8 text, with or without a byte order mark.
+
+    Line ends are left as they are. errors: what becomes of bytes that are no UTF-8, as in
+    `bytes.decode`.
+    Raises: InputError naming `what` and the path as `existing`, and where it is no UTF-8, has a
+    line longer than LONGEST_LINE, or is no CSV where it is read as CSV.
+    """
+    raw = existing(path, what, most_bytes).open("rb")
     try:
-        with existing(path, what).open(encoding="utf-8-sig", newline="") as file:
+        with _Lines(raw, encoding="utf-8-sig", errors=errors, newline="") as file:
             yield file
     except (UnicodeDecodeError, csv.Error) as error:
         raise InputError(f"{path}: not a {what} in UTF-8 text ({error})") from error
 
 
-def text_of(path: str | Path, what: str) -> str:
+def text_of(
+    path: str | Path, what: str, most_bytes: int = MOST_TEXT_BYTES, errors: str = "strict"
+) -> str:
     """Return the text of a file.
 
-    Raises: as `text_file`.
+    Raises: as `bytes_of`, and where it is no UTF-8.
     """
-    with text_file(path, what) as file:
-        return file.read()
+    data = bytes_of(path, what, most_bytes)
+    try:
+        return data.decode("utf-8-sig", errors)
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path}: not a {what} in UTF-8 text ({error})") from error
 
 
 def slug(name: str) -> str:
-    """Return the file name of a subtype or scheme: lower case, runs of other characters than
-    letters and digits as one "-"."""
+    """Return the file name of a subtype or scheme.
+
+    It is in lower case; each run of characters other than letters and digits is one "-".
+    """
     return re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-")

@@ -5,11 +5,16 @@ Lines end with a single newline on every system, and equal rows give equal bytes
 
 import csv
 import math
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from lowalt.files.atomic import replacing, text_file
 from lowalt.files.errors import InputError, shown
+
+MOST_COLUMNS = 10_000
+MOST_CELLS = 10_000_000
+"""Largest numbers of columns and cells of a table; a cell takes some hundred bytes of memory."""
 
 COMPRESSED = {"gzip": b"\x1f\x8b", "zip": b"PK\x03\x04"}
 """First bytes of compressed files."""
@@ -19,7 +24,8 @@ def read_csv(path: str | Path, *needed: str, what: str = "table") -> list[dict[s
     """Return a CSV file's rows as dicts of text; what: the file in words, for errors.
 
     Raises: InputError naming the file and the columns that it lacks or has twice, the line whose
-    number of cells differs, a compressed file, and one whose cells are separated by semicolons.
+    number of cells differs, a compressed file, one whose cells are separated by semicolons, and one
+    of more than MOST_COLUMNS or MOST_CELLS.
     """
     _refuse_compressed(path, what)
     with text_file(path, what) as file:
@@ -29,7 +35,11 @@ def read_csv(path: str | Path, *needed: str, what: str = "table") -> list[dict[s
             raise InputError(
                 f"{path}: cells are separated by semicolons, expected commas and points in numbers"
             )
-        if twice := sorted({name for name in columns if columns.count(name) > 1}):
+        if len(columns) > MOST_COLUMNS:
+            raise InputError(
+                f"{path}: {len(columns)} columns, expected a {what} of at most {MOST_COLUMNS}"
+            )
+        if twice := sorted(name for name, count in Counter(columns).items() if count > 1):
             raise InputError(
                 f"{path}: column {shown(twice[0])} stands twice, expected every column once"
             )
@@ -43,6 +53,8 @@ def read_csv(path: str | Path, *needed: str, what: str = "table") -> list[dict[s
                     f"{path} line {reader.line_num}: {len(cells)} cells, expected {len(columns)}"
                 )
             rows.append(dict(zip(columns, cells, strict=True)))
+            if len(rows) * len(columns) > MOST_CELLS:
+                raise InputError(f"{path}: expected a {what} of at most {MOST_CELLS} cells")
         return rows
 
 
@@ -60,8 +72,9 @@ def _refuse_compressed(path: str | Path, what: str) -> None:
 
 
 def number(row: Mapping[str, str], column: str, path: str | Path) -> float:
-    """Return a cell of a table of texts as a finite number. Raises: InputError naming the file,
-    column and cell.
+    """Return a cell of a table of texts as a finite number.
+
+    Raises: InputError naming the file, column and cell.
     """
     try:
         value = float(row[column])
@@ -73,17 +86,19 @@ def number(row: Mapping[str, str], column: str, path: str | Path) -> float:
 
 
 def write_csv(path: str | Path, columns: Sequence[str], rows: Iterable[Mapping | Sequence]) -> None:
-    """Write a header of `columns` and the rows: sequences of cells, or dicts, whose missing keys
-    become empty cells.
+    """Write a header of `columns` and the rows: sequences of cells, or dicts by column.
 
-    Cells are written by `str`, None as an empty cell. The file appears only when it is complete.
+    A key that a dict lacks becomes an empty cell. Cells are written by `str`, None as an empty
+    cell. The file appears only when it is complete.
     Raises: InputError naming the file and the keys of a dict that are no columns.
     """
     with replacing(path) as temporary, temporary.open("w", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(columns)
         for row in rows:
-            writer.writerow(_cells(path, columns, row) if isinstance(row, Mapping) else row)
+            if isinstance(row, Mapping):
+                row = _cells(path, columns, row)
+            writer.writerow(row)
 
 
 def _cells(path: str | Path, columns: Sequence[str], row: Mapping) -> list:

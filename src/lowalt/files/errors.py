@@ -1,6 +1,4 @@
-"""The exceptions for bad input: their message names the file, key or value, and what was expected
-instead.
-"""
+"""The exceptions for bad input, whose messages name the file, key or value and the expected one."""
 
 import difflib
 import re
@@ -13,14 +11,17 @@ from pathlib import Path
 
 
 def instead(unknown: Iterable[object], known: Iterable[str], otherwise: str = "") -> str:
-    """Return what was expected instead of unknown names: similar known names, else `otherwise` or
-    all.
+    """Return what was expected instead of unknown names, in words.
+
+    These are the similar ones among the known names, else `otherwise`, else all known names.
     """
     known = list(known)
-    near = dict.fromkeys(
-        other for name in unknown for other in difflib.get_close_matches(str(name), known, 1)
-    )
-    return f"perhaps {list(near)}" if near else otherwise or f"only {known}"
+    near: dict[str, None] = {}
+    for name in unknown:
+        near |= dict.fromkeys(difflib.get_close_matches(str(name), known, 1))
+    if near:
+        return f"perhaps {list(near)}"
+    return otherwise or f"only {known}"
 
 
 LONGEST = 400
@@ -28,10 +29,27 @@ LONGEST = 400
 
 
 def shortened(text: str, longest: int = LONGEST) -> str:
-    """Return a text of at most `longest` characters, with its middle cut out: the start tells where
-    a fault is, the end what was expected."""
+    """Return a text of at most `longest` characters, with its middle cut out.
+
+    The start tells where a fault is, the end what was expected.
+    """
+    if len(text) <= longest:
+        return text
     start = 2 * longest // 3
-    return text if len(text) <= longest else f"{text[:start]} ... {text[start + 5 - longest :]}"
+    end = longest - start - len(" ... ")
+    return f"{text[:start]} ... {text[-end:]}"
+
+
+def in_plain_characters(text: str) -> str:
+    """Return a text whose control characters, and others that a terminal obeys instead of showing,
+    are written as escapes such as \\x1b; line ends and tabs stay.
+    """
+    if text.isprintable():
+        return text
+    return "".join(
+        sign if sign.isprintable() or sign in "\n\t" else sign.encode("unicode_escape").decode()
+        for sign in text
+    )
 
 
 def shown(value: object) -> str:
@@ -44,15 +62,14 @@ def shown(value: object) -> str:
 
 
 class InputError(ValueError):
-    """Bad input from outside; the message names the file, key or value and what was expected
-    instead.
+    """Bad input from outside; the message says where it stands and what was expected instead.
 
-    It has at most LONGEST characters.
+    It has at most LONGEST characters, and no control character of a file reaches the terminal.
     """
 
     def __init__(self, message: str) -> None:
         """Take the message; its middle is cut out if it is too long."""
-        super().__init__(shortened(message))
+        super().__init__(shortened(in_plain_characters(shortened(message))))
 
 
 class BelowFloor(InputError):
@@ -60,17 +77,15 @@ class BelowFloor(InputError):
 
 
 class SpaceError(InputError):
-    """A disk or memory is too small; the message names the file or run, the required and the free
-    space.
-    """
+    """A disk or memory is too small; the message names the required and the free space."""
 
 
 def install_command(extra: str) -> str:
-    """Return the command that installs the packages of an extra of this package, in a checkout and
-    beside a wheel.
+    """Return the command that installs the packages of an extra of this package.
 
-    It names the packages of others and never `lowalt[extra]`: no index holds that name, so whoever
-    registered it could run code on the user's machine.
+    It holds in a checkout and beside a wheel. It names the packages of others and never
+    `lowalt[extra]`: no index holds that name, so whoever registered it could run code on the user's
+    machine.
     """
     from importlib.metadata import requires  # takes 30 ms, which no other call should pay
 
@@ -83,8 +98,7 @@ def install_command(extra: str) -> str:
 
 
 def lacking(error: ImportError) -> InputError:
-    """Return the refusal of what needs a package that is not installed, with the command that
-    installs it.
+    """Return the refusal of what needs a missing package, with the command that installs it.
 
     Raises: the error unchanged where no extra of this package names that one.
     """
@@ -102,17 +116,18 @@ def lacking(error: ImportError) -> InputError:
 
 @contextmanager
 def reading(path: str | Path, kind: str) -> Iterator[None]:
-    """Turn any exception of a reader into an InputError that names the file, since libraries raise
-    many types.
+    """Turn any exception of a reader into an InputError that names the file.
 
-    Raises: InputError, the reader's own, or that the file is not a readable `kind`.
+    Libraries raise many types. Raises: InputError, the reader's own, or that the file is not a
+    readable `kind`.
     """
     try:
         yield
     except InputError as error:
-        raise InputError(
-            str(error) if str(error).startswith(str(path)) else f"{path}: {error}"
-        ) from None
+        message = str(error)
+        if not message.startswith(str(path)):
+            message = f"{path}: {message}"
+        raise InputError(message) from None
     except Exception as error:
         raise InputError(
             f"{path}: not a readable {kind} ({type(error).__name__}: {error})"
@@ -125,7 +140,7 @@ def in_one_line(error: Exception) -> str:
 
 
 class InputWarning(UserWarning):
-    """Warning: the user's input looks wrong but is used unchanged; the message says what and where."""
+    """The user's input looks wrong but is used unchanged; the message says what and where."""
 
 
 def warn(text: str) -> None:
@@ -139,4 +154,4 @@ def warn(text: str) -> None:
     ):
         level = level + 1
         frame = frame.f_back
-    warnings.warn(text, InputWarning, stacklevel=level)
+    warnings.warn(in_plain_characters(text), InputWarning, stacklevel=level)

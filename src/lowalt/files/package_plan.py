@@ -1,8 +1,7 @@
-"""The plan of the package: the core's rooms, each importing only earlier ones, and the extensions,
-which import any.
+"""The plan of the package: the core's rooms in the order of imports, and the extensions.
 
-A room of the core imports no extension: `tests/test_house.py` checks this, and
-`docs/rooms_picture.py` draws it.
+A room imports only earlier rooms; an extension imports any. A room of the core imports no
+extension: `tests/test_house.py` checks this, and `docs/rooms_picture.py` draws it.
 """
 
 import ast
@@ -38,14 +37,13 @@ EXTENSIONS = tuple(
 
 
 def modules(room: str) -> list[Path]:
-    """Return the Python files of a room or an extension, including those in its subfolders, sorted."""
+    """Return the Python files of a room or an extension and of its subfolders, sorted."""
     return sorted((PACKAGE / room).rglob("*.py"))
 
 
 @cache
 def rooms_imported(path: Path) -> frozenset[str]:
-    """Return the rooms and extensions from which a file imports, including its own if it imports
-    from there.
+    """Return the rooms and extensions from which a file imports, its own if it imports from there.
 
     The result is cached per process.
     """
@@ -57,12 +55,17 @@ def rooms_imported(path: Path) -> frozenset[str]:
             names += [f"{PACKAGE.name}.{alias.name}" for alias in node.names]
         elif isinstance(node, ast.ImportFrom) and node.module:
             names.append(node.module)
-    parts = [name.split(".") for name in names]
-    own = [part[1:] for part in parts if part[0] == PACKAGE.name and len(part) > 1]
-    extensions = {
-        f"extensions/{part[1]}" for part in own if part[0] == "extensions" and len(part) > 1
-    }
-    return frozenset(part[0] for part in own if part[0] in ROOMS) | extensions
+    result = set()
+    for name in names:
+        package, _, inside = name.partition(".")
+        room, _, below = inside.partition(".")
+        if package != PACKAGE.name:
+            continue
+        if room in ROOMS:
+            result.add(room)
+        elif room == "extensions" and below:
+            result.add(f"extensions/{below.partition('.')[0]}")
+    return frozenset(result)
 
 
 def purpose(path: Path) -> str:

@@ -36,8 +36,7 @@ def download(
 
 
 def fetch_each(names: Iterable[str], fetch: Callable[[str], bool]) -> None:
-    """Call `fetch` for each file's name and print the result; a file that fails does not stop the
-    others.
+    """Call `fetch` for each file's name and print the result, also after one that fails.
 
     fetch: returns False if the file existed already. Failures go to standard error.
     Raises: InputError with the count of files that failed.
@@ -46,11 +45,13 @@ def fetch_each(names: Iterable[str], fetch: Callable[[str], bool]) -> None:
     failed = 0
     for name in names:
         try:
-            print(name, "fetched" if fetch(name) else "already there")
+            fetched = fetch(name)
+            print(name, "fetched" if fetched else "already there")
         except InputError as error:
             failed += 1
             print(f"failed: {error}", file=sys.stderr)
     if failed:
         raise InputError(
-            f"{failed} of {len(names)} files could not be fetched (named above), the others are there"
+            f"{failed} of {len(names)} files could not be fetched (named above), the others are "
+            "there"
         )

@@ -23,14 +23,15 @@ def started(pid: int) -> int | None:
 
 
 def state(pid: int) -> str | None:
-    """Return the state of a process as one letter, None where there is no such process or no /proc."""
+    """Return the state of a process as one letter, None without such a process or /proc."""
     fields = _fields(pid)
     return None if fields is None else fields[0]
 
 
 def _fields(pid: int) -> list[str] | None:
-    """Fields of /proc/PID/stat from the third (the state) on; the second may contain spaces and
-    brackets.
+    """Fields of /proc/PID/stat from the third (the state) on.
+
+    The second, the name in brackets, may itself contain spaces and brackets.
     """
     try:
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()

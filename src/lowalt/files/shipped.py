@@ -35,11 +35,10 @@ def _exists(path: str | Path) -> bool:
 
 
 def shipped(name: str | Path) -> Path:
-    """Return `name` where the working directory has it, else the package's file of this name, if
-    there is one.
-    """
-    path = SHIPPED / name
-    return path if _exists(path) and not _exists(name) else Path(name)
+    """Return `name` as a path, or the package's file of this name if only the package has it."""
+    if _exists(SHIPPED / name) and not _exists(name):
+        return SHIPPED / name
+    return Path(name)
 
 
 def located(config: dict, folder: Path = SHIPPED) -> dict:
@@ -51,14 +50,15 @@ def located(config: dict, folder: Path = SHIPPED) -> dict:
 
     def packaged(name: str) -> str:
         """The path in `folder` of a file that only it has, else the name."""
-        return str(folder / name) if not _exists(name) and _exists(folder / name) else name
+        if _exists(folder / name) and not _exists(name):
+            return str(folder / name)
+        return name
 
     return _renamed(config, packaged)
 
 
 def as_named(config: dict, folder: Path = SHIPPED) -> dict:
-    """Return the configuration with files of `folder` named relative to it: the inverse of
-    `located`.
+    """Return the configuration with files of `folder` named relative to it, unlike `located`.
 
     Files that a run stores or shares then do not depend on the place of installation. A path stays
     absolute if its relative name would mean another file in the working directory.
@@ -70,7 +70,9 @@ def as_named(config: dict, folder: Path = SHIPPED) -> dict:
         if not path.is_absolute() or not path.is_relative_to(folder):
             return name
         relative = path.relative_to(folder)
-        return name if relative.exists() and not relative.samefile(path) else str(relative)
+        if relative.exists() and not relative.samefile(path):
+            return name
+        return str(relative)
 
     return _renamed(config, named)
 

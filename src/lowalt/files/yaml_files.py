@@ -1,15 +1,18 @@
 """Strict reader of YAML files (configuration, records): a mapping without duplicate keys."""
 
+import itertools
+from collections.abc import Hashable
 from pathlib import Path
 
 import yaml
 
 from lowalt.files.atomic import text_of
 from lowalt.files.errors import InputError, in_one_line
+from lowalt.files.json_objects import MOST_BITS
 
 
 class _UniqueKeys:
-    """Safe YAML loader in which a duplicate key is an error; `name` is the file's name in messages."""
+    """Safe YAML loader that refuses duplicate keys; `name` is the file's name in messages."""
 
     name: str
 
@@ -18,16 +21,35 @@ class _UniqueKeys:
 
         Raises: InputError naming the line where a key stands twice.
         """
-        # A list, not a set: for a key that cannot be hashed, YAML has its own message.
-        seen = []
+        seen = set()
         for key_node, _ in node.value:
             key = self.construct_object(key_node, deep=True)  # type: ignore[attr-defined]
+            # For a key that cannot be hashed, YAML has its own message.
+            if not isinstance(key, Hashable):
+                continue
             if key in seen:
                 raise InputError(
                     f"{self.name}: key {key!r} stands twice (line {key_node.start_mark.line + 1})"
                 )
-            seen.append(key)
+            seen.add(key)
         return super().construct_mapping(node, deep)  # type: ignore[misc]
+
+    def construct_yaml_int(self, node: yaml.ScalarNode) -> int:
+        """Return the whole number as the library does.
+
+        Raises: ValueError for one of more than MOST_BITS bits, and for more characters than such a
+        number has: parts in base 60 make a number that takes minutes.
+        """
+        value = 0
+        fits = len(node.value) <= 2 * MOST_BITS
+        if fits:
+            value = super().construct_yaml_int(node)  # type: ignore[misc]
+        if not fits or value.bit_length() > MOST_BITS:
+            raise ValueError(
+                f"{node.value[:20]!r}, {len(node.value)} characters, expected a whole number of at "
+                f"most {MOST_BITS} bits"
+            )
+        return value
 
 
 class _Loader(_UniqueKeys, yaml.SafeLoader):
@@ -35,67 +57,78 @@ class _Loader(_UniqueKeys, yaml.SafeLoader):
 
 
 class _FastLoader(_UniqueKeys, getattr(yaml, "CSafeLoader", yaml.SafeLoader)):  # type: ignore[misc]
-    """libyaml's parser, seven times as fast. It is recursive, so a million nesting levels would
-    crash the process.
+    """libyaml's parser, which is seven times as fast.
+
+    It is recursive, so a million nesting levels would crash the process.
     """
+
+
+for _kind in (_Loader, _FastLoader):
+    _kind.add_constructor("tag:yaml.org,2002:int", _kind.construct_yaml_int)  # type: ignore[type-var]
 
 
 DEEPEST = 10_000
-"""Limit on characters that can open a nesting level; a text with more of them is read by the Python
-parser.
-"""
+"""Limit on nesting levels; a text that may have more of them is read by the Python parser."""
 
-
+MOST_YAML_BYTES = 4 << 20
+"""Largest size of a file: its parser takes up to two hundred times as much memory."""
+MOST_ENTRIES = 200_000
+"""Largest number of lines and commas of a file, which bounds its values before they are made."""
 MOST_NODES = 1_000_000
-"""Limit on the values of a file after the expansion of anchors: ten lines can expand to billions.
-"""
+"""Limit on the values of a file after the expansion of anchors: ten lines can make billions."""
 
 TEMPLATE = "__use_yte__"
-"""The key with which a configuration asks Snakemake's reader to run the Python expressions in it.
-"""
+"""The key that asks Snakemake's reader to run the Python expressions in a configuration."""
 
 
 def _check_size(root: yaml.Node | None, path: str | Path) -> None:
-    """Refuse a document whose anchors make more than MOST_NODES values, or make a value contain
-    itself.
-    """
+    """Refuse anchors that make more than MOST_NODES values, or a value that contains itself."""
     sizes: dict[int, int] = {}
 
     def size(node: yaml.Node | None) -> int:
-        """Number of values in a node after the expansion of anchors; counting stops beyond
-        MOST_NODES.
-        """
+        """Number of values in a node after the expansion of anchors."""
         if not isinstance(node, yaml.CollectionNode):
             return 1
         if id(node) not in sizes:
-            sizes[id(node)] = (
-                MOST_NODES + 1
-            )  # until the node is counted; a node inside itself is endless
-            pairs = (
-                node.value
-                if isinstance(node, yaml.MappingNode)
-                else [(entry,) for entry in node.value]
-            )
-            sizes[id(node)] = 1 + sum(size(entry) for pair in pairs for entry in pair)
+            # A node that is met inside itself is endless.
+            sizes[id(node)] = MOST_NODES + 1
+            inner = node.value
+            if isinstance(node, yaml.MappingNode):
+                inner = itertools.chain.from_iterable(node.value)
+            sizes[id(node)] = 1 + sum(map(size, inner))
         return sizes[id(node)]
 
     if size(root) > MOST_NODES:
         raise InputError(
-            f"{path}: its anchors make more than {MOST_NODES} values of it, expected a plain document"
+            f"{path}: its anchors make more than {MOST_NODES} values of it, expected a plain "
+            "document"
         )
 
 
-def load_yaml(path: str | Path, what: str = "configuration", holds: str = "keys") -> dict:
-    """Return the mapping in a YAML file; `what` and `holds` name the file and its entries in
-    messages.
+def _levels(text: str) -> int:
+    """Return a number that the nesting levels of a text do not exceed.
 
-    Raises: InputError naming the file where it is missing, not YAML, no mapping, a template, or has
-    a key twice.
+    A level opens by a bracket, or on one line by a mark behind those before it, or deeper within a
+    line by at least one column; a list may begin in the column of its key.
     """
-    text = text_of(path, what)
+    deepest = 0
+    for line in text.splitlines():
+        indent = len(line) - len(line.lstrip())
+        deepest = max(deepest, 2 * indent + sum(map(line.count, "-:?")))
+    return deepest + text.count("[") + text.count("{")
+
+
+def load_yaml(path: str | Path, what: str = "configuration", holds: str = "keys") -> dict:
+    """Return the mapping in a YAML file.
+
+    what, holds: the file and its entries in words, for messages. Raises: InputError naming the file
+    where it is missing, too large, not YAML, no mapping, a template, or has a key twice.
+    """
+    text = text_of(path, what, MOST_YAML_BYTES)
+    if text.count("\n") + text.count(",") > MOST_ENTRIES:
+        raise InputError(f"{path}: over {MOST_ENTRIES} lines and commas, expected a shorter {what}")
     try:
-        levels = sum(map(text.count, "[{-:?"))
-        loader = (_Loader if levels > DEEPEST else _FastLoader)(text)
+        loader = (_Loader if _levels(text) > DEEPEST else _FastLoader)(text)
         loader.name = str(path)
         root = loader.get_single_node()
         _check_size(root, path)

@@ -1,3 +1,4 @@
-"""The machine that computes: compiled kernels, threads, memory, clocks, progress. No stage is known
-here.
+"""The machine that computes: compiled kernels, threads, memory, clocks, progress.
+
+No stage is known here.
 """

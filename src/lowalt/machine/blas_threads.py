@@ -1,5 +1,4 @@
-"""Limits BLAS to one thread for computations whose last bits must not depend on the number of
-threads.
+"""Limits BLAS to one thread where last bits must not depend on the number of threads.
 
 With another number of threads, BLAS splits matrix products and sums differently, which changes the
 last bits. For the small products here, more threads are also slower while other processes use the

@@ -19,8 +19,9 @@ def processor() -> str:
 
 
 def _accelerator() -> str:
-    """Name of the first visible NVIDIA GPU from nvidia-smi, without importing a framework; "no GPU"
-    without one.
+    """Name of the first visible NVIDIA GPU from nvidia-smi, "no GPU" without one.
+
+    No framework is imported for it.
     """
     tool = shutil.which("nvidia-smi")
     if not tool or os.environ.get("CUDA_VISIBLE_DEVICES") in ("", "-1"):
@@ -28,13 +29,16 @@ def _accelerator() -> str:
     query = subprocess.run(
         [tool, "--query-gpu=name", "--format=csv,noheader"], capture_output=True, text=True
     )
-    names = query.stdout.split("\n") if query.returncode == 0 else []
-    return names[0].strip() if names and names[0].strip() else "no GPU"
+    if query.returncode != 0:
+        return "no GPU"
+    first, _, _ = query.stdout.partition("\n")
+    return first.strip() or "no GPU"
 
 
 def describe() -> str:
-    """Return one line without commas (it stands in CSV cells), such as "Intel Xeon; 2 cores; 24
-    GiB; no GPU".
+    """Return one line, such as "Intel Xeon; 2 cores; 24 GiB; no GPU".
+
+    It has no commas, since it stands in cells of CSV.
     """
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 2**30
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()

@@ -1,5 +1,4 @@
-"""Compilation of kernels: at the first call, once per machine, and again if the code that a kernel
-runs changes.
+"""Compilation of kernels: at the first call, once per machine, and again after a change of code.
 
 numba's own cache only checks the file of a function, not the functions that it calls in other
 files, so after an edit there old machine code would stay in use. Here the key of a cache entry
@@ -29,9 +28,7 @@ def _text_of(value) -> str:
 
 
 def _used(function: Any) -> Iterator[tuple[str, object]]:
-    """Yield the names and values of globals, of attributes of modules, and of outer variables that
-    a function uses.
-    """
+    """Yield names and values of globals, module attributes and outer variables of a function."""
     code = function.__code__
     for name in code.co_names:
         value = function.__globals__.get(name)
@@ -52,9 +49,7 @@ def _options_of(options: dict) -> str:
 
 
 def _parts(function: Any, seen: set[str]) -> Iterator[str]:
-    """Yield as text everything that determines the machine code of `function`; each kernel that it
-    calls comes once.
-    """
+    """Yield as text all that determines the machine code of `function`, each called kernel once."""
     name = f"{function.__module__}.{function.__qualname__}"
     if name in seen:
         return
@@ -77,9 +72,7 @@ def _parts(function: Any, seen: set[str]) -> Iterator[str]:
 
 
 def digest(function: Callable, options: dict | None = None) -> str:
-    """Return the SHA-256 of a kernel's bytecode and options, and of all kernels and constants that
-    it uses.
-    """
+    """Return the SHA-256 of a kernel's bytecode and options, and of what it calls and uses."""
     total = hashlib.sha256(_options_of(options or {}).encode())
     for part in _parts(function, set()):
         total.update(part.encode() + b"\0")
@@ -119,8 +112,9 @@ class Kernel:
         return self.dispatcher._numba_type_
 
     def __call__(self, *arguments: Any) -> Any:
-        """Run the machine code. Raises: TypeError for an inner kernel, which has no entry that
-        Python could jump to.
+        """Run the machine code.
+
+        Raises: TypeError for an inner kernel, which has no entry that Python could jump to.
         """
         if self.inner:
             raise TypeError(
@@ -130,9 +124,9 @@ class Kernel:
 
 
 def kernel(inner: bool = False, **options) -> Callable[[Callable], Kernel]:
-    """Return a decorator like `numba.njit(**options)` that compiles later and keeps machine code by
-    its digest.
+    """Return a decorator like `numba.njit(**options)` that compiles later and keeps machine code.
 
+    The code is kept by its digest.
     inner: only kernels call the function. Calling it from Python raises TypeError.
     """
     # Entry points for Python and C take a fifth of the compilation time. No kernel is passed to C.

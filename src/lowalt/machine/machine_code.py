@@ -1,5 +1,4 @@
-"""Machine code of kernels, compiled by numba with the options of each and cached by the digest of
-all code it runs.
+"""Machine code of kernels, compiled by numba and cached by the digest of all code it runs.
 
 Every kernel states whether products may be fused and sums reordered. numba's internal functions,
 such as the product of complex numbers, are compiled separately for each set of options. Otherwise
@@ -25,16 +24,12 @@ from lowalt.files.errors import InputError
 
 
 def _fields(kind) -> tuple:
-    """Return the names of the fields of a named tuple's type, of those inside it, and so on, in
-    their order.
-    """
+    """Return the names of the fields of a named tuple's type, and of those inside it, in order."""
     return (getattr(kind, "fields", ()), *map(_fields, getattr(kind, "types", ())))
 
 
-class _PartsByOptions(dict):
-    """numba's own parts of kernels by their names, types, and how freely the kernel that asks for
-    one may round.
-    """
+class _ByOptions(dict):
+    """numba's own functions by name, types, and how freely the asking kernel may round."""
 
     def _key(self, key):
         """The key together with the options of the kernel that is being compiled."""
@@ -42,7 +37,7 @@ class _PartsByOptions(dict):
         return key, str(stack.top().fastmath) if stack else ""
 
     def get(self, key, default=None):
-        """Return the part that was compiled for these options, or `default`."""
+        """Return the function that was compiled for these options, or `default`."""
         return super().get(self._key(key), default)
 
     def __getitem__(self, key):
@@ -56,14 +51,12 @@ class _PartsByOptions(dict):
 # Cause: numba compiles its internal functions, such as the product of complex numbers, once for all
 # kernels, with the options of the first. Held in: numba 0.68. Cure: one copy for each set of
 # options.
-cpu_target.target_context.cached_internal_func = _PartsByOptions()
+cpu_target.target_context.cached_internal_func = _ByOptions()
 _numba_finalizes = CPUCodeLibrary._finalize_final_module
 
 
 def _finalize(library: CPUCodeLibrary) -> None:
-    """Finish a kernel's machine code as numba does, but let the kernel call its own copies of other
-    functions.
-    """
+    """Finish a kernel's machine code as numba does, but with its own copies of other functions."""
     # Fault: a kernel calls another copy of a function than it was compiled with. No issue upstream.
     # Held in numba 0.68.
     # Cause: by numba's linking, all kernels of a process share the copy of a function loaded first.
@@ -97,9 +90,7 @@ class _DigestCache(FunctionCache):
     """Gives the digest of all code that the function runs."""
 
     def _index_key(self, sig, codegen):
-        """Numba's key, the digest of code and options, the linking, and the fields of named tuples
-        among arguments.
-        """
+        """numba's key, the digest of code and options, the linking, fields of named tuples."""
         return (
             *super()._index_key(sig, codegen),
             self.digest(),
@@ -116,7 +107,8 @@ class _DigestCache(FunctionCache):
             rtsys.initialize(target_context)
         with self._guard_against_spurious_io_errors():
             try:
-                if (kept := self._load_overload(sig, target_context)) is not None:
+                kept = self._load_overload(sig, target_context)
+                if kept is not None:
                     return kept
             except (ImportError, AttributeError):
                 # The index of cached code names argument types; it is unreadable if one of them has
@@ -149,9 +141,9 @@ def dispatcher(
     try:
         compiled._cache = _DigestCache(function)
     except RuntimeError:
-        place = f"beside {function.__code__.co_filename} nor in this user's cache"
         raise InputError(
-            f"machine code can be kept neither {place}, expected XDG_CACHE_HOME: a folder that this user may write"
+            f"machine code can be kept neither beside {function.__code__.co_filename} nor in this "
+            "user's cache, expected XDG_CACHE_HOME: a folder that this user may write"
         ) from None
     compiled._cache.options = options
     compiled._cache.digest = digest

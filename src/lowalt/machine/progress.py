@@ -47,7 +47,7 @@ class Reporter:
         self._last = clock()
 
     def __call__(self, done: int) -> None:
-        """Write that `done` parts are done, unless the last line is less than EVERY_S seconds old."""
+        """Write that `done` units are done, unless a line was written in the last EVERY_S."""
         now = self._clock()
         if now - self._last >= EVERY_S:
             self._last = now
@@ -60,9 +60,7 @@ class Reporter:
 
 @contextmanager
 def announced(words: str, stream: TextIO | None = None, every_s: float = EVERY_S) -> Iterator[None]:
-    """Write every `every_s` seconds that a step goes on which cannot count its parts: its words and
-    its seconds.
-    """
+    """Write every `every_s` seconds that a step goes on which cannot count: words and seconds."""
     ended = threading.Event()
     began = time.monotonic()
 
@@ -91,8 +89,7 @@ def reported(items: Iterable[Item], total: int, unit: str) -> Iterator[Item]:
 
 
 def last(log: str | Path, since: float = 0.0) -> Progress | None:
-    """Return the last progress in a log file, or None where it has none in its last lines or is not
-    there.
+    """Return the last progress in a log file, or None where its last lines have none.
 
     since: seconds since the epoch; a file last written more than a second before is of an earlier
     run.

@@ -7,6 +7,7 @@ from multiprocessing import get_all_start_methods, get_context
 from typing import Any
 
 from lowalt.files.errors import InputError, SpaceError
+from lowalt.machine.run_pipe import end_with_starter
 
 
 def together(calls: Sequence[Callable[[], Any]], jobs: int, start: str = "fork") -> list[Any]:
@@ -22,7 +23,8 @@ def together(calls: Sequence[Callable[[], Any]], jobs: int, start: str = "fork")
         raise InputError(f"jobs: {jobs}, expected 1 or more")
     if jobs == 1 or start not in get_all_start_methods():
         return [call() for call in calls]
-    with ProcessPoolExecutor(min(jobs, max(len(calls), 1)), get_context(start)) as pool:
+    count = min(jobs, max(len(calls), 1))
+    with ProcessPoolExecutor(count, get_context(start), end_with_starter) as pool:
         begun = [pool.submit(call) for call in calls]
         try:
             return [future.result() for future in begun]

@@ -1,6 +1,4 @@
-"""Timers for all measured times: the median of alternating calls, and the minimum over several
-calls.
-"""
+"""Timers for all measured times: the median of alternating calls, and the least of several."""
 
 import statistics
 import time
@@ -11,21 +9,22 @@ def in_turn(
     calls: list[tuple[Callable[[], object], int, int]],
     clock: Callable[[], float] = time.perf_counter,
 ) -> list[tuple[float, object]]:
-    """Return the median seconds and the last result of each call, given as (call, rounds, times a
-    round).
+    """Return the median seconds and the last result of each call.
 
+    A call is given as (call, rounds, times a round).
     Calls alternate, so that a slow second of the machine affects all of them.
     """
     spent: list[list[float]] = [[] for _ in calls]
     results: list[object] = [None] * len(calls)
     for turn in range(max(rounds for _, rounds, _ in calls)):
         for index, (call, rounds, times) in enumerate(calls):
-            for _ in range(times if turn < rounds else 0):
+            if turn >= rounds:
+                continue
+            for _ in range(times):
                 seconds, results[index] = once(call, clock)
                 spent[index].append(seconds)
-    return [
-        (statistics.median(times), result) for times, result in zip(spent, results, strict=True)
-    ]
+    medians = [statistics.median(seconds) for seconds in spent]
+    return list(zip(medians, results, strict=True))
 
 
 def median_s(work: Callable[[], object], repeats: int) -> float:

@@ -41,7 +41,7 @@ from lowalt.numerics.streams import stream
 from lowalt.recognition.evaluated import Evaluated, difference
 from lowalt.recognition.schemes import SPECTRA, TABLE, joined, named, names
 from lowalt.recognition.statistics import pareto
-from lowalt.recognition.tables import accuracy_rows
+from lowalt.recognition.tables import ACCURACY, accuracy_rows
 
 COLUMNS = (
     "scheme",
@@ -91,8 +91,7 @@ SPEED = (
 def read_speeds(
     paths: list[str | Path], table: str | Path, stations: Sequence[str]
 ) -> dict[str, dict]:
-    """Return the columns that describe each scheme and its network, and its share of the stations,
-    by its name.
+    """Return the columns that describe each scheme, and its share of the stations, by its name.
 
     paths: files of `network_speed`; table: table of schemes; stations: names of the network's
     stations, in its order.
@@ -137,6 +136,12 @@ def sample_seconds(paths: list[str | Path], samples: int) -> float:
     return total / samples
 
 
+def _average(runs: list[Evaluated], part: str, seed: int) -> dict:
+    """The row of accuracy.csv with the mean over the SNRs, which is the last, by column."""
+    *_, last = accuracy_rows(runs, part, seed)
+    return dict(zip(ACCURACY, last, strict=True))
+
+
 def trained_row(runs: list[Evaluated], base: list[Evaluated], data_s: float, seed: int) -> dict:
     """Return the measured columns of a trained scheme, compared with `base` on the same samples.
 
@@ -145,25 +150,23 @@ def trained_row(runs: list[Evaluated], base: list[Evaluated], data_s: float, see
     Raises: as `evaluated.difference`.
     """
     about = runs[0].about
-    unseen = list(accuracy_rows(runs, "test", seed))[-1]
-    seen = (
-        list(accuracy_rows(runs, "seen_test", seed))[-1]
-        if len(runs[0].part("seen_test"))
-        else ("", "")
-    )
+    unseen = _average(runs, "test", seed)
+    seen_percent = ""
+    if len(runs[0].part("seen_test")):
+        seen_percent = _average(runs, "seen_test", seed)["accuracy_percent"]
     generator = stream(seed, "price", runs[0].scheme, "avg")
     points, low, high = (100 * value for value in difference(runs, base, generator))
     return {
         "kind": "trained",
         "steps": about["steps"],
         "train_samples": about["train_samples"],
-        "seen_percent": seen[1],
-        "unseen_percent": unseen[1],
-        "macro_f1_low": unseen[3],
-        "macro_f1_high": unseen[4],
-        "hardware": unseen[6],
-        "seeds": unseen[7],
-        "spread_points": unseen[8],
+        "seen_percent": seen_percent,
+        "unseen_percent": unseen["accuracy_percent"],
+        "macro_f1_low": unseen["macro_f1_low"],
+        "macro_f1_high": unseen["macro_f1_high"],
+        "hardware": unseen["hardware"],
+        "seeds": unseen["seeds"],
+        "spread_points": unseen["spread_points"],
         "difference_points": points,
         "low": low,
         "high": high,
@@ -179,8 +182,7 @@ def table_rows(
     data_s: float,
     seed: int,
 ) -> list[dict]:
-    """Return the rows of accuracy_cost.csv: the trained schemes in their order, then those only
-    timed.
+    """Return the rows of accuracy_cost.csv: trained schemes in their order, then those only timed.
 
     runs: trainings of each scheme by its name, one per seed, the first scheme's first; speeds: as
     `read_speeds` gives them; presets: rows with the columns PRESETS. Raises: InputError for unequal
@@ -203,9 +205,8 @@ def table_rows(
             )
         by_name[preset["scheme"]].update(preset=preset["preset"], command=preset["command"])
     seconds = np.array([row["core_s_data"] + row["core_s_training"] for row in rows])
-    for row, best in zip(
-        rows, pareto(seconds, np.array([float(row["unseen_percent"]) for row in rows])), strict=True
-    ):
+    percent = np.array([float(row["unseen_percent"]) for row in rows])
+    for row, best in zip(rows, pareto(seconds, percent), strict=True):
         row["front"] = "yes" if best else "no"
     return rows + [row for name, row in speeds.items() if name not in runs]
 
@@ -243,7 +244,8 @@ def main(arguments: list[str]) -> None:
         name = next((studies[end] for end in studies if folder.endswith(end)), training.scheme)
         by_name.setdefault(name, []).append(training)
     order = [*names(options.schemes), *studies.values()]
-    if unknown := sorted(set(by_name) - set(order)):
+    unknown = sorted(set(by_name) - set(order))
+    if unknown:
         raise InputError(
             f"{options.schemes}: no row for {unknown}, expected one for each prediction file"
         )
@@ -251,7 +253,10 @@ def main(arguments: list[str]) -> None:
     speeds = read_speeds(options.speeds, options.schemes, station_names(index["render"]["network"]))
     data_s = sample_seconds(options.data_jobs, sum(shard["samples"] for shard in index["shards"]))
     rows = table_rows(runs, speeds, presets, data_s, seed)
-    write_csv(options.out, COLUMNS, [[short(row.get(name)) for name in COLUMNS] for row in rows])
+    cells = []
+    for row in rows:
+        cells.append([short(row.get(name)) for name in COLUMNS])
+    write_csv(options.out, COLUMNS, cells)
 
 
 if __name__ == "__main__":

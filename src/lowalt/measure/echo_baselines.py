@@ -30,16 +30,14 @@ def _ratio(x: np.ndarray, count: int) -> np.ndarray:
 def amplitudes(
     network: Network, station: Station, motion: Rigid, rcs_m2, aim_m
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Ranges (N, L) in m and complex amplitudes (N, L), array gains included, in the precision of
-    the motion.
-    """
-    place, horizontal, aim, rcs = (
+    """Ranges (N, L) m and complex amplitudes (N, L) with array gains, as precise as the motion."""
+    position, horizontal, aim, rcs = (
         np.asarray(value, motion.points.dtype)
         for value in (station.position_m, station.horizontal, aim_m, rcs_m2)
     )
-    d = positions(motion) - place
+    d = positions(motion) - position
     r = np.sqrt(np.einsum("nli,nli->nl", d, d))
-    aim = (aim - place) / np.linalg.norm(aim - place)
+    aim = (aim - position) / np.linalg.norm(aim - position)
     kappa = station.frequency_hz / network.carrier_hz
     psi = d @ horizontal / r - aim @ horizontal
     omega = d[..., 2] / r - aim[2]
@@ -63,9 +61,9 @@ def amplitudes(
 def closed(
     network: Network, station: Station, motion: Rigid, rcs_m2, aim_m, dtype: type = np.float64
 ) -> np.ndarray:
-    """Signal (N,): the closed form in plain NumPy over the cells around the target (arg max not
-    certified).
+    """Signal (N,): the closed form in plain NumPy over the cells around the target.
 
+    The strongest cell is not certified.
     dtype: precision of every step, from the positions on.
     """
     arrays = {
@@ -90,8 +88,9 @@ def closed(
 def finufft_cells(
     network: Network, station: Station, motion: Rigid, rcs_m2, aim_m, tolerance: float = 1e-9
 ) -> np.ndarray:
-    """Range cells (N, M): one non-uniform FFT (type 1, FINUFFT) a symbol from points to
-    subcarriers, with one plan.
+    """Range cells (N, M): one non-uniform FFT a symbol from points to subcarriers, with one plan.
+
+    The transform is of type 1, by FINUFFT.
     """
     from finufft import Plan
 

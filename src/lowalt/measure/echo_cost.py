@@ -1,19 +1,23 @@
-"""Error of the echo against computing time: every method and tolerance at several numbers of
-points.
+"""Error of the echo against computing time, of every method and tolerance.
+
+Both are measured at several numbers of points.
 
     python -m lowalt.measure.echo_cost --settings JSON --clouds a.npz ... --out cost.csv
 
 Settings: network, motion and cost blocks of the configuration, its seed, and the published rows of
 the targets. The table has one row per method, tolerance and number of points:
     seconds         of one signal at one station on one core: median of the repeats, mean over the
-    clouds relative_error  largest error over the judged symbols and clouds, relative to the largest
-    value of the signal
+                    clouds
+    relative_error  largest error over the judged symbols and clouds, relative to the largest value
+                    of the signal
 The truth is `lowalt.measure.fifty_digits`, at two random symbols and the deepest fade.
 """
 
 import functools
 import os
 import sys
+from collections.abc import Callable
+from typing import Any
 
 import mpmath
 import numpy as np
@@ -27,7 +31,7 @@ from lowalt.files.errors import BelowFloor
 from lowalt.machine.hardware import processor
 from lowalt.machine.timing import in_turn
 from lowalt.measure import echo_baselines
-from lowalt.measure.fifty_digits import cells_mp, places_mp
+from lowalt.measure.fifty_digits import cells_mp, positions_mp
 from lowalt.motion import poses
 from lowalt.motion.drawing import draw, region_polygon
 from lowalt.numerics.streams import stream
@@ -54,9 +58,9 @@ def sample(
     distance_m: float,
     points: int,
 ) -> tuple[Rigid, np.ndarray, np.ndarray]:
-    """A random motion of `cloud` that starts `distance_m` from the first station: (motion, rcs_m2,
-    aim_m).
+    """A random motion of `cloud` that starts `distance_m` away: (motion, rcs_m2, aim_m).
 
+    The distance is from the first station.
     points: how many of the cloud's points are taken, at random and repeated if need be.
     """
     rng = stream(seed, "cost", cloud.subtype, distance_m, points)
@@ -81,21 +85,24 @@ def sample(
 def truths(
     network: Network, sample: tuple, signal: np.ndarray, cell: np.ndarray, seed: int
 ) -> dict[int, mpmath.mpc]:
-    """The true values of the strongest cells (N,) at two random symbols and the deepest fade of a
-    signal (N,).
+    """The true values of the strongest cells (N,) at three symbols of a signal (N,).
+
+    They are two random symbols and the deepest fade.
     """
-    rng, (motion, rcs_m2, aim_m) = stream(seed, "judged symbols"), sample
+    motion, rcs_m2, aim_m = sample
+    rng = stream(seed, "judged symbols")
     chosen = {
         *rng.choice(len(signal), min(2, len(signal)), replace=False).tolist(),
         int(np.argmin(abs(signal))),
     }
+    station = network.stations[0]
     values = {}
     for n in chosen:
-        places = places_mp(motion, n)
+        points_m = positions_mp(motion, n)
         strongest = [int(cell[n])]
-        values[n] = cells_mp(
-            network, network.stations[0], places, rcs_m2.tolist(), aim_m.tolist(), strongest
-        )[0]
+        (values[n],) = cells_mp(
+            network, station, points_m, rcs_m2.tolist(), aim_m.tolist(), strongest
+        )
     return values
 
 
@@ -111,24 +118,24 @@ def error(signal: np.ndarray, truth: dict[int, mpmath.mpc]) -> float:
 def measured(
     network: Network, sample: tuple, seed: int, block: dict
 ) -> dict[tuple, tuple[float, float]]:
-    """Return the median seconds and the error of one sample by (method, tolerance), tolerances that
-    float64 keeps.
+    """Return median seconds and error of one sample by (method, tolerance).
+
+    Tolerances are those that float64 keeps.
     """
-    arguments = (network, network.stations[0], *sample)
+    motion, rcs_m2, aim_m = sample
+    arguments = (network, network.stations[0], motion, rcs_m2, aim_m)
     repeats = block["repeats"]
     exact = echo_signal(*arguments)
     truth = truths(network, sample, exact.signal, exact.cell, seed)
-    calls = {
-        (NAIVE32, ""): (
-            functools.partial(echo_baselines.closed, *arguments, np.float32),
-            repeats,
-            1,
-        ),
-        (NAIVE64, ""): (functools.partial(echo_baselines.closed, *arguments), repeats, 1),
-        (NUFFT, ""): (functools.partial(echo_baselines.finufft, *arguments), repeats, 1),
+    closed = functools.partial(echo_baselines.closed, *arguments)
+    finufft = functools.partial(echo_baselines.finufft, *arguments)
+    calls: dict[tuple, tuple[Callable[[], Any], int, int]] = {
+        (NAIVE32, ""): (functools.partial(closed, dtype=np.float32), repeats, 1),
+        (NAIVE64, ""): (closed, repeats, 1),
+        (NUFFT, ""): (finufft, repeats, 1),
     }
     for tolerance in (None, *block["tolerances"]):
-        call = functools.partial(echo_signal, *arguments, tolerance)
+        call = functools.partial(echo_signal, *arguments, tolerance=tolerance)
         try:
             call()
         except BelowFloor:
@@ -136,17 +143,16 @@ def measured(
         # A call takes about a millisecond, so with only five calls one interrupt would be a quarter
         # of the time.
         calls[ENGINE, tolerance or "exact"] = call, repeats, 8
-    timed = in_turn(list(calls.values()))
-    return {
-        key: (seconds, error(result.signal if key[0] == ENGINE else result, truth))
-        for key, (seconds, result) in zip(calls, timed, strict=True)
-    }
+    timed: list[tuple[float, Any]] = in_turn(list(calls.values()))
+    found = {}
+    for (method, tolerance), (seconds, result) in zip(calls, timed, strict=True):
+        signal = result.signal if method == ENGINE else result
+        found[method, tolerance] = (seconds, error(signal, truth))
+    return found
 
 
 def measure(network: Network, clouds: list[Cloud], published: dict, block: dict) -> list[dict]:
-    """Return the table's rows (keys COLUMNS): over all clouds the mean of the seconds and the
-    largest error.
-    """
+    """Return the table's rows (keys COLUMNS): mean seconds and largest error over all clouds."""
     rows = []
     for points in block["points"]:
         by_method: dict[tuple, list[tuple[float, float]]] = {}

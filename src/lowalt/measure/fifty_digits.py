@@ -1,6 +1,6 @@
-"""The echo's truth: cells of one symbol in fifty decimal digits, by sums over array elements and
-subcarriers.
+"""The echo's truth: cells of one symbol in fifty decimal digits, by plain sums.
 
+The sums run over array elements and subcarriers.
 Neither code nor formulas are shared with the closed form in `lowalt.echo`: the steering vectors and
 the inverse DFT of Eqs. 8 to 24 of the paper are summed as geometric sums, one point at a time.
 Needs mpmath (extra `cost`).
@@ -14,7 +14,7 @@ C = 299_792_458
 
 
 def _run(step, length: int):
-    """Return the sum of step^k over k = 0..length - 1, its terms doubled bit by bit of the length."""
+    """Return the sum of step^k over k = 0..length - 1, doubled bit by bit of the length."""
     total = mpmath.mpc(0)
     power = mpmath.mpc(1)
     for bit in f"{length:b}":
@@ -26,25 +26,25 @@ def _run(step, length: int):
     return total
 
 
-def places_mp(motion, n: int, digits: int = 50) -> list[list]:
-    """Return the positions (L, 3) of symbol n of a rigid motion as mpmath numbers, without a
-    rounding in float64.
+def positions_mp(motion, n: int, digits: int = 50) -> list[list]:
+    """Return the positions (L, 3) of symbol n of a rigid motion as mpmath numbers.
+
+    Nothing is rounded in float64.
     """
+    positions = []
     with mpmath.workdps(digits):
-        return [
-            [
-                mpmath.fdot(motion.rotation[n, part, axis].tolist(), point)
-                + float(motion.translation[n, part, axis])
-                for axis in range(3)
-            ]
-            for point, part in zip(motion.points.tolist(), motion.part, strict=True)
-        ]
+        for point, part in zip(motion.points.tolist(), motion.part, strict=True):
+            rotation = motion.rotation[n, part].tolist()
+            translation = motion.translation[n, part].tolist()
+            turned = [mpmath.fdot(row, point) for row in rotation]
+            positions.append([turned[axis] + translation[axis] for axis in range(3)])
+    return positions
 
 
 def cells_mp(network, station, points_m, rcs_m2, aim_m, cells, digits=50):
-    """The cells listed of one symbol, mpmath complex numbers; points_m: L positions of three
-    numbers, taken as exact.
+    """The listed cells of one symbol as mpmath complex numbers.
 
+    points_m: L positions of three numbers, taken as exact.
     Each point's steering and subcarrier sums are plain geometric sums over exactly given phases.
     """
     with mpmath.workdps(digits):
@@ -76,8 +76,8 @@ def cells_mp(network, station, points_m, rcs_m2, aim_m, cells, digits=50):
             for array in (network.transmit, network.receive):
                 gain *= _run(step_h, array[0]) * _run(step_v, array[1])
             gain *= mpmath.expjpi(-4 * low * r / mpf(C))
-            for place, cell in enumerate(cells):
+            for index, cell in enumerate(cells):
                 step = mpmath.expjpi(2 * mpf(int(cell)) / count - 4 * spacing * r / mpf(C))
-                sums[place] += gain * _run(step, count) / count
+                sums[index] += gain * _run(step, count) / count
         scale = mpmath.sqrt(mpf(network.power) / (n_t * n_r))
         return [scale * value for value in sums]

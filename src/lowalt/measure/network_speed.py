@@ -8,6 +8,7 @@ reading is not timed. The minimum of several passes is used, because other work 
 only add time. On one thread the time is processor time.
 """
 
+import functools
 import json
 import time
 from collections.abc import Callable
@@ -29,8 +30,9 @@ BATCHES = (1, 64)
 
 
 def _clock(machine: Machine, threads: int) -> Callable[[], float]:
-    """Return the clock (s): processor time on one thread, else wall time, on a GPU after its work
-    has finished.
+    """Return the clock (s): processor time on one thread, else wall time.
+
+    On a GPU it waits until the work has finished.
     """
     if machine.device.type == "cuda":
 
@@ -80,12 +82,11 @@ def measure(scheme: Scheme, settings: dict, limit_s: float = 2.0) -> dict:
     with torch.inference_mode(), machine.autocast():
         model.eval()
         for batch in BATCHES:
-            images = _inputs(batch, scheme, settings["size"]).to(machine.device)
-            fits = sample_s * batch < limit_s
-            sample_s = (
-                least_s(lambda x=images: model(x), limit_s, clock) / batch if fits else sample_s
-            )
-            times[f"inference_ms_{batch}"] = 1e3 * sample_s if fits else None
+            times[f"inference_ms_{batch}"] = None
+            if sample_s * batch < limit_s:
+                images = _inputs(batch, scheme, settings["size"]).to(machine.device)
+                sample_s = least_s(functools.partial(model, images), limit_s, clock) / batch
+                times[f"inference_ms_{batch}"] = 1e3 * sample_s
     # Forward and backward cost about three times a forward.
     most = max(1.0, min(block["batch"], limit_s / 4 / (3 * sample_s)))
     batch = 1 << int(np.log2(most))

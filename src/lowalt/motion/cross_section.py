@@ -17,8 +17,10 @@ LOOKS = 2048
 TILT_DEG = 20.0
 """Largest pitch and roll of a target in the air, as in config/default.yaml."""
 SEEN_FROM_DEG = {True: (-20.0, 0.0), False: (3.0, 10.0)}
-"""Elevations of a station seen from a target in the air (True) and on the ground: most of those of
-config/default.yaml, masts of 25 m."""
+"""Elevations of a station seen from a target in the air (True) and on the ground.
+
+They are most of those of config/default.yaml, masts of 25 m.
+"""
 _PRIMES = (2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41, 43, 47, 53, 59, 61, 67, 71, 73)
 
 
@@ -33,25 +35,28 @@ def mean_cross_section(cloud: Cloud, wavelength_m: float) -> float:
     1992, ch. 3.
     """
     turning = [*cloud.parts_of("rotor"), *cloud.parts_of("wheel")]
+    # Columns: pitch, roll, yaw, elevation, time, and the angle of each part that turns.
     even = np.arange(1, LOOKS + 1)[:, None] * np.sqrt(_PRIMES[: 5 + len(turning)]) % 1.0
-    flies = cloud.like in AIRBORNE
     of_yaw, of_elevation, of_time = even[:, 2:5].T
+    flies = cloud.like in AIRBORNE
     tilt = np.radians(TILT_DEG) * flies * (2.0 * even[:, :2] - 1.0)
     attitude = np.column_stack([2 * np.pi * of_yaw, tilt])
     low, high = SEEN_FROM_DEG[flies]
     sine, cosine = portable.sine_cosine(np.radians(low + (high - low) * of_elevation))
     toward = np.column_stack([np.zeros(LOOKS), cosine, sine])
-    lasts_s = len(cloud.track) / cloud.record["track_rate_hz"] if len(cloud.track) else 1.0
+    lasts_s = 1.0
+    if len(cloud.track):
+        lasts_s = len(cloud.track) / cloud.record["track_rate_hz"]
     row = {"model": 0, **dict.fromkeys(NUMBERS, 0.0), "rate_hz": 1.0, "playback": 1.0}
     turns = {part: 2 * np.pi * even[:, 5 + order] for order, part in enumerate(turning)}
-    rotation, translation = poses(
-        cloud, row, lasts_s * of_time, Perturbation(turns, None, attitude)
-    )
+    changes = Perturbation(turns, None, attitude)
+    rotation, translation = poses(cloud, row, lasts_s * of_time, changes)
     nearer = portable.dot(translation, toward[:, None])[:, cloud.part]
     axes = portable.applied(rotation.swapaxes(2, 3), toward[:, None])
     for axis in range(3):
         nearer += axes[:, cloud.part, axis] * cloud.points[:, axis]
-    sines, cosines = portable.sine_cosine_turns(2.0 / wavelength_m * nearer)
+    two_way_turns = 2.0 / wavelength_m * nearer
+    sines, cosines = portable.sine_cosine_turns(two_way_turns)
     amplitude = np.sqrt(np.asarray(cloud.rcs_m2, float))
     imaginary = portable.total(amplitude * sines)
     real = portable.total(amplitude * cosines)

@@ -14,6 +14,9 @@ from lowalt.motion.table import NUMBERS, PHASES, SCALE
 from lowalt.numerics import portable
 from lowalt.targets.cloud import Cloud, extent
 
+MOST_DRAWS = 10_000
+"""How often a position is drawn before the region is found to have none."""
+
 
 def region_polygon(masts_m: np.ndarray, polygon_m: list | None) -> np.ndarray:
     """Return the region's corners (K, 2) m, counter-clockwise.
@@ -24,7 +27,9 @@ def region_polygon(masts_m: np.ndarray, polygon_m: list | None) -> np.ndarray:
     # Imported late: the Snakefile imports this module and rarely needs a hull.
     from scipy.spatial import ConvexHull, QhullError
 
-    corners = np.array(masts_m if polygon_m is None else polygon_m, dtype=float)
+    corners = np.array(masts_m, dtype=float)
+    if polygon_m is not None:
+        corners = np.array(polygon_m, dtype=float)
     if corners.ndim != 2 or corners.shape[1:] != (2,) or len(corners) < 3:
         raise InputError(
             f"motion: region polygon has shape {corners.shape}, expected three or more (x, y) "
@@ -53,7 +58,7 @@ def _edges(corners: np.ndarray, point: np.ndarray) -> np.ndarray:
 def masts_in_reach(
     masts_m: list[list[float]], polygon_m: list | None, mast_clearance_m: float
 ) -> list[list[float]]:
-    """Return the masts [x, y] (m) on which the places of targets depend.
+    """Return the masts [x, y] (m) on which the positions of targets depend.
 
     polygon_m: corners of a convex region, or None where the masts themselves span it;
     mast_clearance_m: least distance of a target to a mast. A mast farther than that from a given
@@ -63,11 +68,8 @@ def masts_in_reach(
         return masts_m
     corners = region_polygon(np.zeros((0, 2)), polygon_m)
     # Use twice the clearance, so that rounding cannot change a draw.
-    return [
-        mast
-        for mast in masts_m
-        if _distance_m(np.array(mast, dtype=float), corners) < 2 * mast_clearance_m
-    ]
+    reach_m = 2 * mast_clearance_m
+    return [mast for mast in masts_m if _distance_m(np.array(mast, float), corners) < reach_m]
 
 
 def _distance_m(point: np.ndarray, corners: np.ndarray) -> float:
@@ -77,21 +79,23 @@ def _distance_m(point: np.ndarray, corners: np.ndarray) -> float:
     side = np.roll(corners, -1, axis=0) - corners
     away = point - corners
     share = np.clip((away * side).sum(1) / (side * side).sum(1), 0.0, 1.0)
-    return float(np.hypot(*(away - share[:, None] * side).T).min())
+    x, y = (away - share[:, None] * side).T
+    return float(np.hypot(x, y).min())
 
 
-def place(
+def position_in(
     rng: np.random.Generator, corners: np.ndarray, masts: np.ndarray, clearance_m: float
 ) -> np.ndarray:
-    """Draw a place (2,) m inside the polygon `corners` and at least `clearance_m` from every mast.
+    """Draw a position (2,) m inside the polygon `corners`, at least `clearance_m` from every mast.
 
-    Raises: InputError where 10,000 draws find none.
+    Raises: InputError where MOST_DRAWS draws find none.
     """
     low = corners.min(axis=0)
     high = corners.max(axis=0)
-    for _ in range(10_000):
+    for _ in range(MOST_DRAWS):
         point = rng.uniform(low, high)
-        far = np.all(portable.dot(masts - point, masts - point) >= clearance_m * clearance_m)
+        squares = portable.dot(masts - point, masts - point)
+        far = np.all(squares >= clearance_m * clearance_m)
         if far and np.all(_edges(corners, point) > 0):
             return point
     raise InputError(f"motion: no place in the region is {clearance_m} m away from every mast")
@@ -111,8 +115,9 @@ def follow_speed(cloud: Cloud, row: dict, speed: float, cadence: str) -> None:
     if cloud.parts_of("wheel"):
         row["rate_hz"] = speed / (math.pi * cloud.record["wheel_diameter_m"])
     if "node" in cloud.kinds:
-        tied = "tied" in (cadence, cloud.record.get("cadence"))
-        row["playback"] = speed / cloud.record["track_speed_mps"] if tied else 1.0
+        row["playback"] = 1.0
+        if "tied" in (cadence, cloud.record.get("cadence")):
+            row["playback"] = speed / cloud.record["track_speed_mps"]
 
 
 def draw_rates(
@@ -170,15 +175,15 @@ def draw(
 ) -> dict:
     """Return one motion model's row (without group and model) for the target `cloud`.
 
-    published: the subtype's ranges (config/targets.csv); masts_m: (S, 2) m, the stations' places;
+    published: the subtype's ranges (config/targets.csv); masts_m: (S, 2) m, the stations' masts;
     corners: (K, 2) m from `region_polygon`; settings: the motion block of the configuration. All
     values are drawn uniformly; where `sizes_m` asks for sizes, the logarithm of the size is. Wheels
     turn at F = v / (pi D) (paper Eq. 16).
-    Raises: InputError where no place satisfies the region or the target has too many parts.
+    Raises: InputError where no position satisfies the region or the target has too many parts.
     """
     row = dict.fromkeys(NUMBERS, math.nan)
     clearance_m = settings["region"]["mast_clearance_m"]
-    row["x_m"], row["y_m"] = map(float, place(rng, corners, masts_m, clearance_m))
+    row["x_m"], row["y_m"] = map(float, position_in(rng, corners, masts_m, clearance_m))
     row["yaw_rad"] = rng.uniform(0.0, 2 * math.pi)
     row["pitch_rad"] = 0.0
     row["roll_rad"] = 0.0

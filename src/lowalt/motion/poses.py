@@ -1,5 +1,6 @@
-"""Poses: position and orientation of each rigid part at each symbol, in closed form from the
-initial pose.
+"""Poses: position and orientation of each rigid part at each symbol.
+
+They follow in closed form from the initial pose.
 
 Angles are beta_0 + 2 pi F t instead of products of many small rotations, so errors do not
 accumulate. All poses have the same bits on every processor: sines and products are those of
@@ -27,8 +28,9 @@ class Poses(NamedTuple):
 
 
 class Perturbation(NamedTuple):
-    """Changes that are added to a target's own motion at N symbols; a field that is None changes
-    nothing.
+    """Changes that are added to a target's own motion at N symbols.
+
+    A field that is None changes nothing.
 
     angle_rad: part -> (N,) rad, added to that part's turn; offset_m: (N, 3) m, added to the whole
     target's position, global frame; tilt_rad: (N, 3) rad, added to the row's yaw, pitch and roll.
@@ -88,7 +90,8 @@ def _angles(
         angles["shoulder"] = np.radians(flap["mean_deg"]) + np.radians(flap["amplitude_deg"]) * now
         angles["fold"] = np.radians(flap["fold_amplitude_deg"]) * later
         for part in wings:
-            phases[part] = ("shoulder" if cloud.parents[part] < 0 else "fold", 0.0)
+            name = "shoulder" if cloud.parents[part] < 0 else "fold"
+            phases[part] = (name, 0.0)
     known = {name: np.isfinite(angle).all() for name, angle in angles.items()}
     bad = []
     for part, (name, phase) in phases.items():
@@ -120,8 +123,9 @@ def _perturbed(
         )
     for part, angle in added.items():
         name, phase = phases[part]
-        angles[f"{name} {part}"] = angles[name] + angle
-        phases[part] = f"{name} {part}", phase
+        own_name = f"{name} {part}"
+        angles[own_name] = angles[name] + angle
+        phases[part] = (own_name, phase)
 
 
 def _series(
@@ -237,7 +241,9 @@ def poses(
     if "turn_radps" in row:
         course, turned_rad = _curved(row, times_s)
         path += course
-        tilt = turned_rad if tilt is None else tilt + turned_rad
+        if tilt is not None:
+            turned_rad = tilt + turned_rad
+        tilt = turned_rad
     if offset is not None:
         path += offset
     if tilt is not None:

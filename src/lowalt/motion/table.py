@@ -5,6 +5,7 @@ import math
 from collections.abc import Collection
 from pathlib import Path
 
+from lowalt.config.classes import refuse_subtype
 from lowalt.files.atomic import text_file
 from lowalt.files.csv_tables import write_csv
 from lowalt.files.errors import InputError
@@ -32,8 +33,11 @@ NUMBERS = (
 COLUMNS = (*TEXTS, "model", *NUMBERS)
 TRACK = ("track", "look")
 PATH = ("ax_mps2", "ay_mps2", "az_mps2", "jx_mps3", "jy_mps3", "jz_mps3", "turn_radps")
-"""Further columns of tables with tracks: number of the track in its subtype and of the look in its
-track; acceleration at the first symbol, its rate of change (jerk), and heading rate."""
+"""Further columns of tables with tracks.
+
+They are the number of the track in its subtype and of the look in its track; acceleration at the
+first symbol, its rate of change (jerk), and heading rate.
+"""
 SCALE = "scale"
 """A further column of tables with random sizes: size of the target relative to its cloud."""
 
@@ -44,7 +48,9 @@ def write_table(path: str | Path, rows: list[dict]) -> None:
     Equal rows give equal bytes. Rows of targets with random sizes have the key SCALE, those of
     tracks the keys TRACK and PATH.
     """
-    further = _further(rows[0] if rows else ())
+    further: tuple[str, ...] = ()
+    if rows:
+        further = _further(rows[0])
     numbers = (*NUMBERS, *further)
     write_csv(path, (*COLUMNS, *further), (_cells(row, numbers) for row in rows))
 
@@ -94,6 +100,7 @@ def _row(path: str | Path, line: int, header: tuple[str, ...], cells: list[str])
     if len(cells) != len(header):
         raise InputError(f"{path}, line {line}: {len(cells)} cells, expected {len(header)}")
     row: dict = dict(zip(header, cells, strict=True))
+    refuse_subtype(row["subtype"], f"{path}, line {line}")
     for name in header[len(TEXTS) :]:
         text = row[name]
         try:

@@ -27,9 +27,9 @@ SLOWEST_MPS = 0.5
 def path_of(motion: dict, corners: np.ndarray, masts_m: np.ndarray) -> LookStarts | None:
     """Return the path of a flight log at the starts of looks, None where `motion` names no log.
 
-    motion: the block of the configuration, whose key `track` names the log; corners (K, 2),
-    masts_m (S, 2): as of `Cell`. Velocities at the log's rows are differences of its positions
-    (second order), and cubics join the rows. The heading is the course.
+    motion: the block of the configuration, whose key `track` names the log; corners (K, 2), masts_m
+    (S, 2): as of `Cell`. Velocities at the log's rows are differences of its positions (second
+    order), and cubics join the rows. The heading is the course.
     Raises: InputError naming the file, and the line, column or position that is wrong.
     """
     if "track" not in motion:
@@ -45,23 +45,25 @@ def path_of(motion: dict, corners: np.ndarray, masts_m: np.ndarray) -> LookStart
             f"{path}: {long_s:g} s long, expected {looks * look_s:g} s for motion.looks {looks}"
         )
     starts_s = times_s[0] + look_s * np.arange(looks + 1)
-    place_m, velocity_mps = _resampled(times_s, positions_m, starts_s)
-    outside = np.flatnonzero(cell.room_m(place_m[:, :2]) <= 0)
+    start_m, velocity_mps = _resampled(times_s, positions_m, starts_s)
+    outside = np.flatnonzero(cell.room_m(start_m[:, :2]) <= 0)
     if len(outside):
-        x, y, _ = place_m[outside[0]]
+        x, y, _ = start_m[outside[0]]
         raise InputError(
             f"{path}: {outside[0] * look_s:g} s after its start at ({x:.1f}, {y:.1f}) m, outside "
             f"the cell; expected a place in motion.region, at least {cell.clearance_m:g} m from "
             "all stations"
         )
-    return LookStarts(place_m, velocity_mps, _headings(velocity_mps))
+    return LookStarts(start_m, velocity_mps, _headings(velocity_mps))
 
 
 def _numbers(path: str | Path, cell: Cell) -> tuple[np.ndarray, np.ndarray]:
     """Times (R,) s and positions (R, 3) m of a log's rows."""
     rows = read_csv(path, "time_s", what="track")
     columns = list(rows[0]) if rows else []
-    named = METRES if set(METRES) <= set(columns) else DEGREES
+    named = DEGREES
+    if set(METRES) <= set(columns):
+        named = METRES
     if len(rows) < 2 or not set(named) <= set(columns):
         raise InputError(
             f"{path}: {len(rows)} rows of the columns {columns}, expected two or more of "
@@ -112,22 +114,23 @@ def _flat(degrees: np.ndarray, middle_m: np.ndarray) -> np.ndarray:
 
 
 def _resampled(
-    times_s: np.ndarray, places_m: np.ndarray, wanted_s: np.ndarray
+    times_s: np.ndarray, positions_m: np.ndarray, wanted_s: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Positions and velocities (N, 3) at the times wanted, on cubics between the rows."""
     order: Literal[1, 2] = 2 if len(times_s) > 2 else 1
-    velocities = np.gradient(places_m, times_s, axis=0, edge_order=order)
+    velocities = np.gradient(positions_m, times_s, axis=0, edge_order=order)
     first = np.clip(np.searchsorted(times_s, wanted_s, side="right") - 1, 0, len(times_s) - 2)
     step = (times_s[first + 1] - times_s[first])[:, None]
     u = (wanted_s - times_s[first])[:, None] / step
-    a = places_m[first]
-    b = places_m[first + 1]
+    a = positions_m[first]
+    b = positions_m[first + 1]
     m = step * velocities[first]
     n = step * velocities[first + 1]
     second = 3 * (b - a) - 2 * m - n
     third = m + n - 2 * (b - a)
     wanted_m = a + u * (m + u * (second + u * third))
-    return wanted_m, (m + u * (2 * second + 3 * u * third)) / step
+    wanted_mps = (m + u * (2 * second + 3 * u * third)) / step
+    return wanted_m, wanted_mps
 
 
 def _headings(velocity_mps: np.ndarray) -> np.ndarray:

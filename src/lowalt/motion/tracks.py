@@ -12,7 +12,7 @@ import numpy as np
 
 from lowalt.config.classes import AIRBORNE
 from lowalt.files.errors import InputError
-from lowalt.motion.drawing import draw, follow_speed, heights, place
+from lowalt.motion.drawing import draw, follow_speed, heights, position_in
 from lowalt.motion.rotations import turns
 from lowalt.motion.table import PATH, SCALE
 from lowalt.numerics import portable
@@ -23,15 +23,17 @@ TURN_RADPS = math.radians(20.0)
 """Largest heading rate of a drawn path, to either side."""
 DRAWS = 20
 """A look whose heading rate was drawn this often in vain turns back."""
+MOST_BEGINNINGS = 1000
+"""How often the beginning of a track is drawn before the region is found to be too small."""
 
 
 class LookStarts(NamedTuple):
     """A path at the starts of its looks and at the end of the last one.
 
-    place_m: (L + 1, 3) m; velocity_mps: (L + 1, 3) m/s; heading_rad: (L + 1,) rad, the yaw.
+    position_m: (L + 1, 3) m; velocity_mps: (L + 1, 3) m/s; heading_rad: (L + 1,) rad, the yaw.
     """
 
-    place_m: np.ndarray
+    position_m: np.ndarray
     velocity_mps: np.ndarray
     heading_rad: np.ndarray
 
@@ -47,18 +49,19 @@ class Cell(NamedTuple):
     masts_m: np.ndarray
     clearance_m: float
 
-    def room_m(self, places_m: np.ndarray) -> np.ndarray:
-        """Return how far places (N, 2) m are from leaving the cell: (N,) m, negative outside."""
+    def room_m(self, positions_m: np.ndarray) -> np.ndarray:
+        """Return how far positions (N, 2) m are from leaving the cell: (N,) m, negative outside."""
         side = np.roll(self.corners, -1, axis=0) - self.corners
-        inward = np.stack([-side[:, 1], side[:, 0]], axis=1) / portable.norm(side)[:, None]
-        rooms = portable.dot(places_m[:, None] - self.corners, inward)
-        masts = portable.norm(places_m[:, None] - self.masts_m.reshape(-1, 2)) - self.clearance_m
-        return np.concatenate([rooms, masts], axis=1).min(axis=1)
+        turned = np.stack([-side[:, 1], side[:, 0]], axis=1)
+        inward = turned / portable.norm(side)[:, None]
+        to_sides = portable.dot(positions_m[:, None] - self.corners, inward)
+        to_masts = portable.norm(positions_m[:, None] - self.masts_m.reshape(-1, 2))
+        return np.concatenate([to_sides, to_masts - self.clearance_m], axis=1).min(axis=1)
 
 
 def turned(
-    place_m: np.ndarray, velocity_mps: np.ndarray, rate: float, times_s: np.ndarray
-) -> tuple:
+    position_m: np.ndarray, velocity_mps: np.ndarray, rate: float, times_s: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Return position and velocity (N, 2) in a coordinated turn at the `times_s` (N,).
 
     Speed and heading rate `rate` (rad/s, not 0) are constant.
@@ -69,30 +72,32 @@ def turned(
     sine = sine[:, None]
     cosine = cosine[:, None]
     left = np.array([-velocity_mps[1], velocity_mps[0]])
-    moved_m = place_m + sine / rate * velocity_mps + (1.0 - cosine) / rate * left
+    moved_m = position_m + sine / rate * velocity_mps + (1.0 - cosine) / rate * left
     return moved_m, cosine * velocity_mps + sine * left
 
 
-def _way_back(cell: Cell, place_m: np.ndarray, velocity_mps: np.ndarray) -> float:
+def _way_back(cell: Cell, position_m: np.ndarray, velocity_mps: np.ndarray) -> float:
     """The heading rate, TURN_RADPS to a side, whose full circle stays in the cell, or else 0."""
     left = np.array([-velocity_mps[1], velocity_mps[0]]) / TURN_RADPS
-    centres = place_m + np.stack([left, -left])
+    centres = position_m + np.stack([left, -left])
     left_fits, right_fits = cell.room_m(centres) >= portable.norm(left)
     if left_fits:
         return TURN_RADPS
-    return -TURN_RADPS if right_fits else 0.0
+    if right_fits:
+        return -TURN_RADPS
+    return 0.0
 
 
 def _begun(rng: np.random.Generator, row: dict, cell: Cell) -> None:
-    """Draw the row's place and course anew until its target can turn inside the cell.
+    """Draw the row's position and course anew until its target can turn inside the cell.
 
-    Raises: InputError where 1000 draws find none.
+    Raises: InputError where MOST_BEGINNINGS draws find none.
     """
-    for _ in range(1000):
+    for _ in range(MOST_BEGINNINGS):
         velocity = np.array([row["vx_mps"], row["vy_mps"]])
         if _way_back(cell, np.array([row["x_m"], row["y_m"]]), velocity):
             return
-        row["x_m"], row["y_m"] = map(float, place(rng, *cell))
+        row["x_m"], row["y_m"] = map(float, position_in(rng, *cell))
         angle = rng.uniform(0.0, 2 * math.pi)
         sine, cosine = map(float, portable.sine_cosine(angle))
         row["vx_mps"] = cosine * velocity[0] - sine * velocity[1]
@@ -113,12 +118,13 @@ def drawn_path(
     looks: int,
     look_s: float,
 ) -> LookStarts:
-    """Return a path of `looks` looks of `look_s` seconds from the place and velocity of `row`.
+    """Return a path of `looks` looks of `look_s` seconds from the position and velocity of `row`.
 
     The heading rate of each look is uniform within TURN_RADPS, drawn again where the target would
     leave the cell or could not turn back; after DRAWS draws it turns back. It climbs the other way
     at the ends of `heights_m` (lowest and highest, m). The speed over ground is constant.
     """
+    # A look is tested at eight instants, the last of them its end.
     step = look_s / 8 * np.arange(1, 9)
     here = np.array([row["x_m"], row["y_m"]])
     velocity = np.array([row["vx_mps"], row["vy_mps"]])
@@ -144,7 +150,7 @@ def drawn_path(
         climb = later
         starts.append((*here, height, *velocity, climb, heading))
     nodes = np.array(starts)
-    return LookStarts(nodes[:, :3], nodes[:, 3:6], nodes[:, 6])
+    return LookStarts(position_m=nodes[:, :3], velocity_mps=nodes[:, 3:6], heading_rad=nodes[:, 6])
 
 
 def _climb(
@@ -155,14 +161,17 @@ def _climb(
     ago_s: float,
     look_s: float,
 ) -> float:
-    """The climb (m/s) after a look that began at `height` (m) and climbed `before`: as wanted, the
-    other way, or none.
+    """Return the climb (m/s) after a look that began at `height` (m) and climbed `before`.
+
+    It is as wanted, the other way, or none.
 
     ago_s: length of that look, 0 at the first one. At the climb returned, the next look ends within
     the heights.
     """
+    lowest, highest = heights_m
     for climb in (wanted, -wanted):
-        if heights_m[0] <= height + ago_s * (before + climb) / 2 + look_s * climb <= heights_m[1]:
+        end_of_next = height + ago_s * (before + climb) / 2 + look_s * climb
+        if lowest <= end_of_next <= highest:
             return climb
     return 0.0
 
@@ -170,8 +179,9 @@ def _climb(
 def rows_along(
     cloud: Cloud, row: dict, path: LookStarts, look_s: float, cadence: str | None
 ) -> list[dict]:
-    """Return the rows of a track's looks: `row` moved along `path`, the target's own motion going
-    on.
+    """Return the rows of a track's looks: `row` moved along `path`.
+
+    The target's own motion goes on.
 
     cadence: as of `follow_speed`, for a path of changing speed; None where the row's speed is the
     path's.
@@ -181,43 +191,45 @@ def rows_along(
     bent, bending = _cubic(path, look_s)
     turn = (np.diff(path.heading_rad) + math.pi) % (2 * math.pi) - math.pi
     for look in range(len(turn)):
-        row |= dict(zip(("x_m", "y_m", "z_m"), path.place_m[look].tolist(), strict=True))
-        row |= dict(
-            zip(("vx_mps", "vy_mps", "vz_mps"), path.velocity_mps[look].tolist(), strict=True)
-        )
+        row["x_m"], row["y_m"], row["z_m"] = path.position_m[look].tolist()
+        row["vx_mps"], row["vy_mps"], row["vz_mps"] = path.velocity_mps[look].tolist()
         row["yaw_rad"] = float(path.heading_rad[look] % (2 * math.pi))
         if cadence is not None:
-            way = (path.place_m[look + 1] - path.place_m[look])[:2]
+            way = (path.position_m[look + 1] - path.position_m[look])[:2]
             follow_speed(cloud, row, float(portable.norm(way)) / look_s, cadence)
             if cloud.parts_of("wheel"):
                 row["rate_hz"] /= row.get(SCALE, 1.0)
-        numbers = *bent[look].tolist(), *bending[look].tolist(), float(turn[look]) / look_s
+        turn_radps = float(turn[look]) / look_s
+        numbers = (*bent[look].tolist(), *bending[look].tolist(), turn_radps)
         rows.append({**row, "look": look, **dict(zip(PATH, numbers, strict=True))})
         _go_on(cloud, row, look_s)
     return rows
 
 
 def _cubic(path: LookStarts, look_s: float) -> tuple[np.ndarray, np.ndarray]:
-    """Acceleration at the start of each look, and its rate of change, (L, 3) both: the cubic
-    between its ends.
+    """Acceleration at the start of each look, and its rate of change, (L, 3) both.
+
+    They are those of the cubic between its ends.
     """
-    way = np.diff(path.place_m, axis=0)
+    way = np.diff(path.position_m, axis=0)
     first = path.velocity_mps[:-1]
     last = path.velocity_mps[1:]
-    return (
-        (6 * way / look_s - 4 * first - 2 * last) / look_s,
-        (6 * (first + last) - 12 * way / look_s) / look_s**2,
-    )
+    acceleration = (6 * way / look_s - 4 * first - 2 * last) / look_s
+    jerk = (6 * (first + last) - 12 * way / look_s) / look_s**2
+    return acceleration, jerk
 
 
 def _go_on(cloud: Cloud, row: dict, look_s: float) -> None:
-    """Move the phases of a row's parts and its place in a recording on by one look."""
+    """Move the phases of a row's parts and its time in a recording on by one look."""
+    # The wings beat together at the rate of the row, with one phase.
     wings = cloud.parts_of("wing")[:1]
     for kind in (cloud.parts_of("rotor"), cloud.parts_of("wheel"), wings):
         for order, part in enumerate(kind):
-            factor = 1.0 if kind is wings else float(cloud.rate_factors[part])
+            rate_hz = row["rate_hz"]
+            if kind is not wings:
+                rate_hz *= float(cloud.rate_factors[part])
             name = f"phase_{order}_rad"
-            turn = float(turns(row["rate_hz"] * factor, np.array(look_s)))
+            turn = float(turns(rate_hz, np.array(look_s)))
             row[name] = (row[name] + 2 * math.pi * turn) % (2 * math.pi)
     if "node" in cloud.kinds:
         duration = len(cloud.track) / cloud.record["track_rate_hz"]
@@ -234,8 +246,9 @@ def model_rows(
     track: int,
     path: LookStarts | None = None,
 ) -> list[dict]:
-    """Return the rows (without group and model) of one motion model: its only look, or all looks of
-    a track.
+    """Return the rows (without group and model) of one motion model.
+
+    It has one look, or all looks of a track.
 
     settings: the configuration's block `motion`, and look_s (s), the length of a look, where it has
     `looks`; track: number of the motion model; path: that of a flight log. Everything else is as of
@@ -253,18 +266,17 @@ def model_rows(
     if path is None:
         cell = Cell(corners, masts_m, settings["region"]["mast_clearance_m"])
         _begun(rng, row, cell)
-        lowest, highest = (
-            heights(settings, cloud.subtype, cloud.category, cloud.like)
-            if airborne
-            else (height_m,) * 2
-        )
+        lowest = height_m
+        highest = height_m
+        if airborne:
+            lowest, highest = heights(settings, cloud.subtype, cloud.category, cloud.like)
         path = drawn_path(rng, row, cell, (lowest, highest), looks, look_s)
         cadence = None
     else:
         cadence = settings["cadence"]
         if not airborne:
             path = path._replace(
-                place_m=path.place_m * [1, 1, 0] + [0, 0, height_m],
+                position_m=path.position_m * [1, 1, 0] + [0, 0, height_m],
                 velocity_mps=path.velocity_mps * [1, 1, 0],
             )
     return [{**row, "track": track} for row in rows_along(cloud, row, path, look_s, cadence)]

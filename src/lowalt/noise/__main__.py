@@ -1,5 +1,6 @@
-"""Command line of the noise stage: clean echoes of a chunk, a file per station -> noisy signals at
-all SNRs.
+"""Command line of the noise stage: clean echoes of a chunk -> noisy signals at all SNRs.
+
+Echoes are given in a file per station.
 """
 
 import functools
@@ -35,7 +36,8 @@ def load_echoes(
         fits = echo.ndim == 2 or (echo.ndim == 3 and echo.shape[1] == snrs)
         if not fits or len(echo) != models or echo.shape != echoes[0].shape:
             raise InputError(
-                f"{path}: shape {echo.shape}, expected ({models}, symbols) as the motion table and others"
+                f"{path}: shape {echo.shape}, expected ({models}, symbols) as the motion table and "
+                "others"
             )
     return echoes
 
@@ -77,10 +79,11 @@ def main(arguments: list[str]) -> None:
     seed, stations, snrs = pick(given.settings, "seed", "stations", "snr_db")
     rows = read_table(given.motion)
     echoes = load_echoes(given.echoes, stations, len(rows), len(snrs))
-    powers = load_powers(given.powers, stations, len(rows)) if given.powers else None
-    result = noisy_signals(
-        np.stack(echoes), rows, stations, [float(snr) for snr in snrs], seed, powers, filtered
-    )
+    powers = None
+    if given.powers:
+        powers = load_powers(given.powers, stations, len(rows))
+    levels = [float(snr) for snr in snrs]
+    result = noisy_signals(np.stack(echoes), rows, stations, levels, seed, powers, filtered)
     with replacing(given.out, result.nbytes) as temporary:
         np.save(temporary, result)
     print(f"{given.out}: {result.shape[0] * result.shape[1]} samples", file=sys.stderr)

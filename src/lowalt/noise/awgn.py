@@ -1,5 +1,6 @@
-"""Complex white Gaussian noise at a set SNR: for one signal, whose mean power is the reference, and
-for a chunk.
+"""Complex white Gaussian noise at a set SNR, for one signal and for a chunk.
+
+The mean power of a signal is the reference.
 """
 
 import math
@@ -17,8 +18,9 @@ from lowalt.numerics.streams import stream
 def add_noise(
     signal: np.ndarray, snr_db: float, rng: np.random.Generator | None, power: float | None = None
 ) -> np.ndarray:
-    """Return `signal` plus circular complex Gaussian noise at `snr_db`, complex128 of the same
-    shape (N,).
+    """Return `signal` plus circular complex Gaussian noise at `snr_db`, complex128 (N,).
+
+    The signal may have any shape, which the result has, too.
 
     The noise power is `power` / 10^(snr_db / 10), where `power` is mean |signal|^2 by default; give
     the power of the target's echo where the signal holds more than that. At an SNR of +inf nothing
@@ -49,12 +51,11 @@ def add_noise(
         raise InputError(f"noise: no generator for an SNR of {snr_db} dB, expected one below +inf")
     # Half the noise's power is in each part: sqrt(1/2) 10^(-SNR / 20).
     share = math.sqrt(0.5) * float(portable.exp(-snr_db * (portable.LN_10 / 20)))
-    real, imaginary = circular(rng.bit_generator.random_raw(2 * signal.size), scale * share)
+    words = rng.bit_generator.random_raw(2 * signal.size)
+    real, imaginary = circular(words, scale * share)
     result = np.empty(signal.shape, np.complex128)
-    result.real, result.imag = (
-        part + more.reshape(signal.shape)
-        for part, more in ((signal.real, real), (signal.imag, imaginary))
-    )
+    result.real = signal.real + real.reshape(signal.shape)
+    result.imag = signal.imag + imaginary.reshape(signal.shape)
     return result
 
 
@@ -67,8 +68,9 @@ def noisy_signals(
     powers: np.ndarray | None = None,
     behind: Callable[[np.ndarray], np.ndarray] | None = None,
 ) -> np.ndarray:
-    """Return noisy signals (models, snrs, stations, N) complex64 of clean `echoes` (stations,
-    models, N).
+    """Return noisy signals (models, snrs, stations, N) complex64 of clean echoes.
+
+    echoes: (stations, models, N).
 
     rows: the motion table; powers: (stations, models) W that SNRs refer to, each echo's own by
     default; behind: filters noise (N,) as the scene's canceller does, if there is one. Echoes
@@ -80,16 +82,15 @@ def noisy_signals(
     result = np.empty((len(rows), len(snrs), len(stations), echoes.shape[-1]), np.complex64)
     for model, row in enumerate(rows):
         for level, snr_db in enumerate(snrs):
-            for place, name in enumerate(stations):
-                rng = (
-                    None
-                    if np.isposinf(snr_db)
-                    else stream(seed, "noise", row["subtype"], row["model"], name, snr_db)
-                )
-                power = None if powers is None else float(powers[place, model])
-                result[model, level, place] = _noisy(
-                    echoes[place, model], snr_db, rng, power, behind
-                )
+            for station, name in enumerate(stations):
+                rng = None
+                if not np.isposinf(snr_db):
+                    rng = stream(seed, "noise", row["subtype"], row["model"], name, snr_db)
+                power = None
+                if powers is not None:
+                    power = float(powers[station, model])
+                noisy = _noisy(echoes[station, model], snr_db, rng, power, behind)
+                result[model, level, station] = noisy
     return result
 
 

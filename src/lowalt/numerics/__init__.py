@@ -1,3 +1,4 @@
-"""Numbers whose bits are the same on every processor: elementary functions, exact sums, random
-draws.
+"""Numbers whose bits are the same on every processor.
+
+They come from elementary functions, exact sums and random draws.
 """

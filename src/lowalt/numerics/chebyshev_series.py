@@ -1,4 +1,6 @@
-"""Chebyshev series: how many terms a wave needs, points, interpolation, a band of waves, and a
+"""Chebyshev series.
+
+The module says how many terms a wave needs; it has points, interpolation, a band of waves, and a
 smooth function.
 """
 
@@ -13,12 +15,19 @@ from lowalt.numerics.large_matrices import matrix_product
 from lowalt.numerics.portable import sine_cosine, sine_cosine_turns
 
 STRIP = 256
-"""Places that pass through the loop together."""
+"""Positions that pass through the loop together."""
+FEW = 256
+"""Number of positions up to which a function is called at each of them."""
+SHORTEST = 1e-12
+"""Least half length of the interval of a series, so that equal positions divide by no zero."""
+COUNTS = (8, 16, 32, 64)
+"""Numbers of terms that are tried in turn."""
 ENOUGH = 1e-14
 """Share of the largest coefficient below which the last quarter of a series must be."""
 SPARE = 24
-"""Points of a wave's series beyond its terms, so that what is left of the series does not fold back
-into them.
+"""Points of a wave's series beyond its terms.
+
+What is left of the series then does not fold back into them.
 """
 
 
@@ -49,8 +58,9 @@ def polynomials(count: int, at: np.ndarray) -> np.ndarray:
 
 
 def to_terms(count: int, terms: int) -> np.ndarray:
-    """Return the matrix (count, terms) from values at `chebyshev_points(count)` to the first terms of
-    their series.
+    """Return the matrix (count, terms) from values at Chebyshev points to a series' first terms.
+
+    The points are `chebyshev_points(count)`.
     """
     # Whole turns of a cosine are left out as whole numbers.
     eighths = np.outer(2 * np.arange(count) + 1, np.arange(terms)) % (4 * count)
@@ -60,8 +70,9 @@ def to_terms(count: int, terms: int) -> np.ndarray:
 
 
 def interpolation(count: int, at: np.ndarray) -> np.ndarray:
-    """Return the Lagrange weights (count, K) from values at `chebyshev_points(count)` to those at
-    `at` (K,).
+    """Return the Lagrange weights (count, K) from values at Chebyshev points to those at `at` (K,).
+
+    The points are `chebyshev_points(count)`.
 
     Source: Trefethen, Approximation Theory and Approximation Practice, 2013, chapters 2 to 5.
     """
@@ -72,8 +83,9 @@ def interpolation(count: int, at: np.ndarray) -> np.ndarray:
 def band_tables(
     nodes: int, spread: float, count: int, error: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the matrices (2 Q P, 2 K) from moments to K frequencies of the band, and (K, M) from
-    these to subcarriers.
+    """Return the matrices from moments to K frequencies of the band, and from these to subcarriers.
+
+    Their shapes are (2 Q P, 2 K) and (K, M).
 
     Rows of the first stand for the moments of each of Q nodes, P real parts and then P imaginary
     ones; columns for K real parts and then K imaginary ones.
@@ -84,24 +96,27 @@ def band_tables(
     argument = np.pi * spread * max(count - 1, 1) / count
     orders = orders_of(argument, error)
     kept = orders_of(argument, error) + nodes
-    band = np.linspace(-1.0, 1.0, count) if count > 1 else np.zeros(1)
+    band = np.zeros(1)
+    if count > 1:
+        band = np.linspace(-1.0, 1.0, count)
     points = chebyshev_points(kept)
     # By the Jacobi-Anger expansion the terms are eps_p (-j)^p J_p; the waves' own series needs no
     # Bessel functions.
-    places = chebyshev_points(orders + SPARE)
-    sine, cosine = sine_cosine(argument * points[:, None] * places)
+    along_wave = chebyshev_points(orders + SPARE)
+    sine, cosine = sine_cosine(argument * points[:, None] * along_wave)
     to_series = to_terms(orders + SPARE, orders)
     real = matrix_product(cosine, to_series).T
     imag = -matrix_product(sine, to_series).T
     weights = interpolation(nodes, points)[:, None, None]
-    parts = np.block([[real, imag], [-imag, real]]).reshape(1, 2 * orders, 2, kept)
-    to_nodes = (weights * parts).reshape(2 * nodes * orders, 2 * kept)
+    complex_product = np.block([[real, imag], [-imag, real]]).reshape(1, 2 * orders, 2, kept)
+    to_nodes = (weights * complex_product).reshape(2 * nodes * orders, 2 * kept)
     return to_nodes, interpolation(kept, band)
 
 
 def over_band(moments: np.ndarray, tables: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
-    """Return the waves' sum at all subcarriers, (N, 2, M), from moments (N, 2 Q P) and tables of
-    `band_tables`.
+    """Return the waves' sum at all subcarriers, (N, 2, M), from their moments (N, 2 Q P).
+
+    tables: of `band_tables`.
 
     Index 1 tells the real from the imaginary part.
     """
@@ -112,8 +127,9 @@ def over_band(moments: np.ndarray, tables: tuple[np.ndarray, np.ndarray]) -> np.
 
 @LEAN
 def _summed(x, terms, work, out):
-    """Fill out (K,) with the series of terms (T,) complex at x (K,), -1 to 1, by Clenshaw's rule;
-    work: (4, STRIP).
+    """Fill out (K,) with the series of terms (T,) complex at x (K,), by Clenshaw's rule.
+
+    x: from -1 to 1; work: (4, STRIP).
     """
     for first in range(0, len(x), STRIP):
         size = min(STRIP, len(x) - first)
@@ -129,7 +145,10 @@ def _summed(x, terms, work, out):
         for k in range(len(terms) - 1, -1, -1):
             a = terms[k].real
             b = terms[k].imag
-            twice = 2.0 if k else 1.0
+            # Clenshaw's last step takes x once, the others twice.
+            twice = 2.0
+            if k == 0:
+                twice = 1.0
             for i in range(size):
                 last_re[i] = a + twice * x[first + i] * re[i] - last_re[i]
                 last_im[i] = b + twice * x[first + i] * im[i] - last_im[i]
@@ -138,25 +157,29 @@ def _summed(x, terms, work, out):
             out[first + i] = complex(re[i], im[i])
 
 
-def at(function: Callable[[np.ndarray], np.ndarray], places: np.ndarray) -> np.ndarray:
-    """Return the complex values of a smooth function at real places (any shape), to rounding;
+def at(function: Callable[[np.ndarray], np.ndarray], positions: np.ndarray) -> np.ndarray:
+    """Return the complex values of a smooth function at real positions (any shape), to rounding.
+
     `function` is pointwise.
 
     The number of terms is doubled until the last quarter of them is below rounding, up to 64; a
-    function that needs more is called at every place, as one of few places is. Source: Aurentz &
-    Trefethen, Chopping a Chebyshev series, ACM Trans. Math. Softw. 43(4), 2017, whose plateau is
-    this quarter.
+    function that needs more is called at every position, as it is for few positions. Source:
+    Aurentz & Trefethen, Chopping a Chebyshev series, ACM Trans. Math. Softw. 43(4), 2017, whose
+    plateau is this quarter.
     """
-    middle = 0.5 * (places.max() + places.min())
-    half = max(0.5 * float(np.ptp(places)), 1e-12)
-    for count in (8, 16, 32, 64) if places.size > 256 else ():
+    if positions.size <= FEW:
+        return function(positions).astype(np.complex128)
+    middle = 0.5 * (positions.max() + positions.min())
+    half = max(0.5 * float(np.ptp(positions)), SHORTEST)
+    for count in COUNTS:
         values = function(middle + half * chebyshev_points(count)).astype(np.complex128)
-        parts = matrix_product(np.stack([values.real, values.imag]), to_terms(count, count))
-        terms = parts[0] + 1j * parts[1]
-        if abs(terms[-count // 4 :]).max() <= ENOUGH * abs(terms).max():
-            out = np.empty(places.shape, np.complex128)
-            _summed(
-                ((places - middle) / half).ravel(), terms, np.empty((4, STRIP)), out.reshape(-1)
-            )
+        real_imag = np.stack([values.real, values.imag])
+        series = matrix_product(real_imag, to_terms(count, count))
+        terms = series[0] + 1j * series[1]
+        last_quarter = terms[-count // 4 :]
+        if abs(last_quarter).max() <= ENOUGH * abs(terms).max():
+            out = np.empty(positions.shape, np.complex128)
+            scaled = ((positions - middle) / half).ravel()
+            _summed(scaled, terms, np.empty((4, STRIP)), out.reshape(-1))
             return out
-    return function(places).astype(np.complex128)
+    return function(positions).astype(np.complex128)

@@ -11,8 +11,9 @@ SPLITTER = 134217729.0
 
 
 def two_sum(a, b):
-    """Return (s, e) with s = a + b rounded and s + e = a + b exactly. Source: Knuth, TAOCP 2,
-    4.2.2.
+    """Return (s, e) with s = a + b rounded and s + e = a + b exactly.
+
+    Source: Knuth, TAOCP 2, 4.2.2.
     """
     s = a + b
     t = s - a

@@ -7,14 +7,13 @@ in operations that IEEE 754 specifies:
     random       the word's upper 53 bits times 2^-53
     uniform      low + (high - low) random
     integers     Lemire's method on 32-bit halves, the lower half of a word first
-    permutation  Fisher and Yates's shuffle from the last place p down: its partner is a 32-bit
-    half's lowest bits, as
-                 many as p has, the next half where that is above p; choice without replacement is
-                 the tail
-    normal       Box and Muller's method on two words: sqrt(-2 ln u) cos(2 pi v) and sqrt(-2 ln u)
-    sin(2 pi v) follow
-                 each other, u = (upper 53 bits of the first + 1) 2^-53, v = (upper 53 bits of the
-                 second) 2^-53
+    permutation  Fisher and Yates's shuffle from the last position p down. The partner of p is
+                 given by the lowest bits of a 32-bit half, as many as p has; where that is above
+                 p, the next half is taken. Choice without replacement is the tail.
+    normal       Box and Muller's method on two words: sqrt(-2 ln u) cos(2 pi v), followed by
+                 sqrt(-2 ln u) sin(2 pi v), with
+                     u = (upper 53 bits of the first word + 1) 2^-53
+                     v = (upper 53 bits of the second word) 2^-53
 
 All other methods are still NumPy's, without this guarantee.
 Sources: Lemire 2019, ACM TOMACS 29(1); Box and Muller 1958; NumPy NEP 19.
@@ -31,30 +30,40 @@ from lowalt.numerics.portable import log, sine_cosine_turns
 
 Size = int | tuple[int, ...] | None
 _HALF = np.uint64(0xFFFFFFFF)
+_HALVES = 2**32
+"""How many values a 32-bit half has."""
+_SURPLUS = np.uint64(11)
+"""Bits of a 64-bit word that a float64 between 0 and 1 cannot hold."""
 COMPILED = 4096
-"""From this number of normals on, loading compiled code pays; it gives the same bits in less time.
-"""
+"""Number of normals from which on loading compiled code pays; it gives the same bits faster."""
 
 
 def _count(size: Size) -> int:
     """How many numbers an array of this size has; None means one number."""
-    return 1 if size is None else math.prod(size) if isinstance(size, tuple) else int(size)
+    if size is None:
+        return 1
+    if isinstance(size, tuple):
+        return math.prod(size)
+    return int(size)
 
 
 def _shaped(values: np.ndarray, size: Size):
     """The one value as a number, or all in the shape asked for."""
-    return values[0].item() if size is None else values.reshape(size)
+    if size is None:
+        return values[0].item()
+    return values.reshape(size)
 
 
 @lru_cache(maxsize=256)
 def _masks(count: int) -> list[int]:
     """For each number below `count`, a mask of as many low bits as the number has."""
-    return [(1 << place.bit_length()) - 1 for place in range(count)]
+    return [(1 << number.bit_length()) - 1 for number in range(count)]
 
 
 class Draws(np.random.Generator):
-    """A generator whose draws are those of the module's table; arguments are as in NumPy's
-    `Generator`.
+    """A generator whose draws are those of the module's table.
+
+    Arguments are as in NumPy's `Generator`.
     """
 
     def __init__(self, bit_generator: np.random.BitGenerator) -> None:
@@ -70,25 +79,28 @@ class Draws(np.random.Generator):
         return self.bit_generator.random_raw(count)
 
     def _halves(self, count: int) -> np.ndarray:
-        """The next `count` 32-bit halves, as (count,) uint64; an upper half left over waits for the
-        next call.
+        """The next `count` 32-bit halves of words, as (count,) uint64.
+
+        An upper half left over waits for the next call.
         """
-        kept = [] if self._kept is None else [self._kept]
+        kept = np.zeros(0, np.uint64)
+        if self._kept is not None:
+            kept = np.array([self._kept], np.uint64)
         fresh = self.words((count - len(kept) + 1) // 2)
         # Viewed as 32-bit numbers, the lower half of a word comes first.
-        halves = fresh.astype("<u8", copy=False).view("<u4").astype(np.uint64)
-        if kept:
-            halves = np.append(np.array(kept, np.uint64), halves)
-        self._kept = int(halves[count]) if len(halves) > count else None
+        lower_first = fresh.astype("<u8", copy=False).view("<u4").astype(np.uint64)
+        halves = np.append(kept, lower_first)
+        self._kept = None
+        if len(halves) > count:
+            self._kept = int(halves[count])
         return halves[:count]
 
     def random(self, size: Size = None, **kwargs):
         """Return numbers in [0, 1), float64."""
         if kwargs:
             raise InputError(f"random: arguments {sorted(kwargs)}, expected none besides size")
-        return _shaped(
-            (self.words(_count(size)) >> np.uint64(11)).astype(np.float64) * 2.0**-53, size
-        )
+        upper_bits = (self.words(_count(size)) >> _SURPLUS).astype(np.float64)
+        return _shaped(upper_bits * 2.0**-53, size)
 
     def uniform(self, low=0.0, high=1.0, size: Size = None):
         """Return numbers in [low, high), float64; arrays of bounds broadcast."""
@@ -108,53 +120,59 @@ class Draws(np.random.Generator):
         """
         if kwargs or np.ndim(low) or np.ndim(high):
             return super().integers(low, high, size, **kwargs)
-        first, end = (0, int(low)) if high is None else (int(low), int(high))
+        first = 0
+        end = int(low)
+        if high is not None:
+            first = int(low)
+            end = int(high)
         width = end - first
-        if not 1 <= width <= 2**32 - 1:
+        if not 1 <= width <= _HALVES - 1:
             raise InputError(
-                f"integers: from {first} to below {end}, expected 1 to {2**32 - 1} values"
+                f"integers: from {first} to below {end}, expected 1 to {_HALVES - 1} values"
             )
-        count = _count(size)
-        taken = np.zeros(count, np.uint64) if width == 1 else self._below(width, count)
-        return _shaped(taken.astype(np.int64) + first, size)
+        above_first = self._below(width, _count(size))
+        return _shaped(above_first.astype(np.int64) + first, size)
 
     def _below(self, width: int, count: int) -> np.ndarray:
-        """`count` whole numbers below `width`, uint64; halves that Lemire's method rejects are
-        skipped.
+        """Return `count` whole numbers below `width`, uint64, by Lemire's method.
+
+        Halves that the method rejects are skipped.
         """
-        if 2**32 % width == 0:
+        if width == 1:
+            return np.zeros(count, np.uint64)
+        if _HALVES % width == 0:
             # Every half is accepted where the width is a power of two.
             return (self._halves(count) * np.uint64(width)) >> np.uint64(32)
-        parts = []
-        missing = count
-        while missing:
-            scaled = self._halves(missing) * np.uint64(width)
+        found = np.zeros(0, np.uint64)
+        while len(found) < count:
+            scaled = self._halves(count - len(found)) * np.uint64(width)
             # Reject products whose lower half is below 2^32 modulo the width: they would favour
             # some numbers.
-            accepted = scaled[(scaled & _HALF) >= np.uint64(2**32 % width)] >> np.uint64(32)
-            parts.append(accepted)
-            missing -= len(accepted)
-        return np.concatenate(parts) if parts else np.zeros(0, np.uint64)
+            accepted = scaled[(scaled & _HALF) >= np.uint64(_HALVES % width)]
+            found = np.append(found, accepted >> np.uint64(32))
+        return found
 
     def _shuffled(self, count: int, first: int) -> np.ndarray:
-        """Return 0 .. count - 1, each place from the last to `first` swapped with a random place
-        not above it.
+        """Return 0 .. count - 1 in random order, or with an unsorted tail alone.
+
+        Each position from the last one down to `first` is swapped with a random one not above it.
         """
         order = list(range(count))
-        place = count - 1
+        position = count - 1
         masks = _masks(count)
-        while place >= first:
-            # Each place needs at least one half, so every half that is drawn is used.
-            for half in self._halves(place - first + 1).tolist():
-                partner = half & masks[place]
-                if partner <= place:
-                    order[place], order[partner] = order[partner], order[place]
-                    place -= 1
+        while position >= first:
+            # Each position needs at least one half, so every half that is drawn is used.
+            for half in self._halves(position - first + 1).tolist():
+                partner = half & masks[position]
+                if partner <= position:
+                    order[position], order[partner] = order[partner], order[position]
+                    position -= 1
         return np.array(order, np.int64)
 
     def permutation(self, x, axis: int = 0):
-        """Return 0 .. x - 1 in random order, int64, or the entries of an array along its first
-        axis.
+        """Return 0 .. x - 1 in random order, or the entries of an array along its first axis.
+
+        Whole numbers are int64.
         """
         if axis != 0:
             return super().permutation(x, axis)
@@ -172,12 +190,14 @@ class Draws(np.random.Generator):
         axis: int = 0,
         shuffle: bool = True,
     ):
-        """Return entries of an array, or of 0 .. a - 1; without replacement the tail of a
-        permutation.
+        """Return entries of an array, or of 0 .. a - 1.
+
+        Without replacement they are the tail of a permutation.
         """
         if p is not None or axis != 0 or not shuffle:
             return super().choice(a, size, replace, p, axis, shuffle)
-        count = int(a) if np.ndim(a) == 0 else len(a)
+        is_number = np.ndim(a) == 0
+        count = int(a) if is_number else len(a)
         wanted = _count(size)
         if replace or size is None:
             numbers = self.integers(count, size=size)
@@ -186,8 +206,11 @@ class Draws(np.random.Generator):
                 f"choice: {wanted} of {count} without replacement, expected no more than there are"
             )
         else:
-            numbers = self._shuffled(count, max(1, count - wanted))[count - wanted :].reshape(size)
-        return numbers if np.ndim(a) == 0 else np.asarray(a)[numbers]
+            first = count - wanted
+            numbers = self._shuffled(count, max(1, first))[first:].reshape(size)
+        if is_number:
+            return numbers
+        return np.asarray(a)[numbers]
 
     def standard_normal(self, size: Size = None, **kwargs):
         """Return numbers with the normal distribution of mean 0 and variance 1, float64."""
@@ -196,32 +219,32 @@ class Draws(np.random.Generator):
                 f"standard_normal: arguments {sorted(kwargs)}, expected none besides size"
             )
         count = _count(size)
+        words = self.words(count + count % 2)
         if count >= COMPILED or "lowalt.numerics.normals" in sys.modules:
             # Imported late: most commands draw few numbers, in less time than loading the compiler
             # takes.
             from lowalt.numerics.normals import interleaved
 
-            return _shaped(interleaved(self.words(count + count % 2))[:count], size)
-        first, second = (self.words(count + count % 2) >> np.uint64(11)).reshape(-1, 2).T
+            return _shaped(interleaved(words)[:count], size)
+        first, second = (words >> _SURPLUS).reshape(-1, 2).T
         radius = np.sqrt(-2.0 * log((first.astype(np.float64) + 1.0) * 2.0**-53))
         sine, cosine = sine_cosine_turns(second.astype(np.float64) * 2.0**-53)
-        return _shaped(np.stack([radius * cosine, radius * sine], axis=1).ravel()[:count], size)
+        pairs = np.stack([radius * cosine, radius * sine], axis=1)
+        return _shaped(pairs.ravel()[:count], size)
 
     def normal(self, loc=0.0, scale=1.0, size: Size = None):
-        """Return numbers with the normal distribution of this mean and standard deviation, float64."""
+        """Return normally distributed numbers of this mean and standard deviation, float64."""
         if size is None and (np.ndim(loc) or np.ndim(scale)):
             size = np.broadcast_shapes(np.shape(loc), np.shape(scale))
         return loc + scale * self.standard_normal(size)
 
     def exponential(self, scale=1.0, size: Size = None):
-        """Return numbers with the exponential distribution of this mean: -scale ln(1 - random),
-        float64.
-        """
+        """Return exponentially distributed numbers of this mean, -scale ln(1 - random), float64."""
         if size is None and np.ndim(scale):
             size = np.shape(scale)
-        share = self.random(1 if size is None else size)
+        share = np.asarray(self.random(size))
         values = -log(1.0 - share) * scale
-        return values[0].item() if size is None else values
+        return values.item() if size is None else values
 
 
 def _restored(bit_generator: np.random.BitGenerator, kept: int | None) -> Draws:

@@ -1,5 +1,6 @@
-"""Large real matrices in a written order of operations, compiled: products, triangular roots and
-principal axes.
+"""Large real matrices in a written order of operations, compiled.
+
+There are products, triangular roots and principal axes.
 
 A BLAS chooses its kernels, and with them the order of its sums, by the processor. These loops add
 each sum from the first term on and take half to twice the time.
@@ -43,8 +44,9 @@ def multiply(a, b, out):
 
 
 def matrix_product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Return the product (I, J) of real matrices (I, K) and (K, J), K > 0, equal to
-    `portable.product` in every bit.
+    """Return the product (I, J) of real matrices (I, K) and (K, J), K > 0.
+
+    It equals `portable.product` in every bit.
     """
     out = np.empty((a.shape[0], b.shape[1]))
     multiply(np.ascontiguousarray(a, np.float64), np.ascontiguousarray(b, np.float64), out)
@@ -68,8 +70,9 @@ def _factor(left):
 
 
 def upper_root(covariance: np.ndarray) -> np.ndarray:
-    """Return the upper triangular U (N, N) with U^T U = `covariance`, symmetric and positive
-    definite.
+    """Return the upper triangular U (N, N) with U^T U = `covariance`.
+
+    covariance: symmetric and positive definite.
 
     Raises: ValueError for a matrix that is not positive definite. Source: Cholesky's decomposition,
     Higham 2002, 10.1.
@@ -84,8 +87,9 @@ def upper_root(covariance: np.ndarray) -> np.ndarray:
 
 @INNER
 def _along(first, second):
-    """The sum of first times second, (N,) each: every fourth product by itself, then these four
-    sums.
+    """Return the sum of first times second, (N,) each.
+
+    Every fourth product is added by itself, then these four sums.
     """
     a = 0.0
     b = 0.0
@@ -104,8 +108,9 @@ def _along(first, second):
 
 @LEAN
 def _orthogonalise(rows, square):
-    """Rotate pairs of rows (K, N) until all are orthogonal; returns whether they are. square: (K,)
-    work space.
+    """Rotate pairs of rows (K, N) until all are orthogonal.
+
+    Returns whether they are. square: (K,) work space.
     """
     for _ in range(SWEEPS):
         turned = False
@@ -122,7 +127,8 @@ def _orthogonalise(rows, square):
                 turned = True
                 slope = (square[q] - square[p]) / (2.0 * both)
                 tangent = 1.0 / (abs(slope) + np.sqrt(slope * slope + 1.0))
-                tangent = tangent if slope >= 0.0 else -tangent
+                if slope < 0.0:
+                    tangent = -tangent
                 cosine = 1.0 / np.sqrt(tangent * tangent + 1.0)
                 sine = tangent * cosine
                 square[p] = max(square[p] - tangent * both, 0.0)
@@ -138,8 +144,9 @@ def _orthogonalise(rows, square):
 
 
 def principal_axes(root: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the eigenvalues (K,) of B B^T for a root B (N, K), and its unit eigenvectors (N, K),
-    in no order.
+    """Return the eigenvalues (K,) of B B^T for a root B (N, K), and its unit eigenvectors (N, K).
+
+    They are in no order.
 
     Eigenvectors of eigenvalue 0 are zeros. Raises: ValueError where the rotations do not converge.
     Source: one-sided Jacobi rotations of a pivoted Cholesky factor, Demmel and Veselic 1992,

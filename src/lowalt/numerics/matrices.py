@@ -1,5 +1,6 @@
-"""3 x 3 matrices in portable operations: the axis of least variance of vectors, and the nearest
-rotations.
+"""3 x 3 matrices in portable operations.
+
+They give the axis of least variance of vectors, and the nearest rotations.
 """
 
 import numpy as np
@@ -8,13 +9,17 @@ from lowalt.numerics.portable import dot, product, total
 
 
 def thinnest(vectors: np.ndarray) -> np.ndarray:
-    """Return the unit vector (3,) along which vectors (N, 3) of zero mean vary least; its largest
-    entry is positive.
+    """Return the unit vector (3,) along which vectors (N, 3) of zero mean vary least.
+
+    Its largest entry is positive.
 
     Source: Jacobi's rotations of the 3 x 3 matrix of second moments.
     """
     columns = np.asarray(vectors, np.float64).T
-    moments = np.array([[total(a * b) for b in columns] for a in columns])
+    moments = np.empty((3, 3))
+    for row, a in enumerate(columns):
+        for column, b in enumerate(columns):
+            moments[row, column] = total(a * b)
     axes = np.eye(3)
     # Each sweep squares the relative size of the elements off the diagonal.
     for _ in range(12):
@@ -22,11 +27,14 @@ def thinnest(vectors: np.ndarray) -> np.ndarray:
             if abs(moments[p, q]) <= 1e-30 * np.diagonal(moments).max():
                 continue
             slope = (moments[q, q] - moments[p, p]) / (2 * moments[p, q])
-            tangent = (1.0 if slope >= 0 else -1.0) / (abs(slope) + np.sqrt(slope * slope + 1))
+            tangent = 1.0 / (abs(slope) + np.sqrt(slope * slope + 1))
+            if slope < 0:
+                tangent = -tangent
             cosine = 1 / np.sqrt(tangent * tangent + 1)
             turn = np.eye(3)
             turn[p, p] = turn[q, q] = cosine
-            turn[p, q], turn[q, p] = tangent * cosine, -tangent * cosine
+            turn[p, q] = tangent * cosine
+            turn[q, p] = -tangent * cosine
             moments = product(product(turn.T, moments), turn)
             moments[p, q] = moments[q, p] = 0.0
             axes = product(axes, turn)
@@ -42,11 +50,13 @@ def nearest_rotations(matrices: np.ndarray) -> np.ndarray:
     result = np.asarray(matrices, np.float64)
     # Each step squares the error; blends of similar rotations need five steps.
     for _ in range(10):
-        rows = [
-            np.cross(result[..., (i + 1) % 3, :], result[..., (i + 2) % 3, :]) for i in range(3)
+        rows = [result[..., i, :] for i in range(3)]
+        crossed = [
+            np.cross(rows[1], rows[2]),
+            np.cross(rows[2], rows[0]),
+            np.cross(rows[0], rows[1]),
         ]
-        cofactors = np.stack(rows, axis=-2)
-        result = 0.5 * (
-            result + cofactors / dot(result[..., 0, :], cofactors[..., 0, :])[..., None, None]
-        )
+        cofactors = np.stack(crossed, axis=-2)
+        determinant = dot(rows[0], crossed[0])[..., None, None]
+        result = 0.5 * (result + cofactors / determinant)
     return result

@@ -1,5 +1,6 @@
-"""Complex normal numbers from raw random words, compiled: the bits of `lowalt.numerics.draws` in
-less time.
+"""Complex normal numbers from raw random words, compiled.
+
+The bits are those of `lowalt.numerics.draws`, in less time.
 
 Only additions, products, divisions, square roots and comparisons of float64 are used, in a fixed
 order and never fused. No divisor can be zero; without a check for zero the compiler vectorises
@@ -27,9 +28,8 @@ _HALF = np.uint64(0xFFFFFFFF)
 _LARGE = np.uint64(0x4530000000000000)
 _SMALL = np.uint64(0x4330000000000000)
 _BOTH = 2.0**84 + 2.0**52
-"""Bits of 2^84 and 2^52, whose sums with 32-bit integers have these as lowest bits; the sum of
-both.
-"""
+"""Bits of 2^84 and 2^52, whose sums with 32-bit integers have these as lowest bits."""
+_SQRT_HALF = 0.70710678118654752440
 _STEP = 2.0**-53
 _TURN = 2 * np.pi
 _TWO = np.uint64(2)
@@ -44,12 +44,10 @@ def _block(words, scale, real, imaginary, twos, lower):
     count = np.uint64(len(real))
     # Few processors have a vector instruction that converts 64-bit integers. Set bits instead, and
     # add both halves of a word's upper 53 bits as float64, without rounding.
-    x, x_low, y, y_low = (
-        real.view(np.uint64),
-        twos.view(np.uint64),
-        imaginary.view(np.uint64),
-        lower.view(np.uint64),
-    )
+    x = real.view(np.uint64)
+    x_low = twos.view(np.uint64)
+    y = imaginary.view(np.uint64)
+    y_low = lower.view(np.uint64)
     for i in range(count):
         one = words[_TWO * i]
         other = words[_TWO * i + _NEXT]
@@ -69,9 +67,10 @@ def _block(words, scale, real, imaginary, twos, lower):
         # In [1, 2), and then f in [sqrt(1/2) - 1, sqrt(2) - 1].
         mantissa = 0.5 * real[i]
         k = twos[i] - _BIASED
-        small = mantissa < 0.70710678118654752440
-        f = (real[i] if small else mantissa) - 1.0
-        k = k - 1.0 if small else k
+        if mantissa < _SQRT_HALF:
+            mantissa = real[i]
+            k = k - 1.0
+        f = mantissa - 1.0
         s = f / (2.0 + f)
         z = s * s
         rest = z * (_L1 + z * (_L2 + z * (_L3 + z * (_L4 + z * (_L5 + z * (_L6 + z * _L7))))))
@@ -97,16 +96,19 @@ def _block(words, scale, real, imaginary, twos, lower):
         below = abs(quarter - 2.5) < 1.0
         x = sine if swapped else cosine
         y = cosine if swapped else sine
-        real[i] = scale * (radius * (-x if left else x))
-        imaginary[i] = scale * (radius * (-y if below else y))
+        if left:
+            x = -x
+        if below:
+            y = -y
+        real[i] = scale * (radius * x)
+        imaginary[i] = scale * (radius * y)
 
 
 @LEAN
 def fill(words, scale, work, out):
-    """Fill out (2, N) with scale times the real and imaginary parts of N complex normals from words
-    (2 N,) uint64.
+    """Fill out (2, N) with complex normals times `scale`, real and imaginary parts.
 
-    work: (2, BLOCK).
+    words: (2 N,) uint64; work: (2, BLOCK).
     """
     for first in range(0, out.shape[1], BLOCK):
         last = min(first + BLOCK, out.shape[1])
@@ -117,8 +119,9 @@ def fill(words, scale, work, out):
 
 @LEAN
 def _fill_pairs(words, work, out):
-    """Fill out (N, 2) with the real and imaginary parts of N complex normals from words (2 N,);
-    work: (4, BLOCK).
+    """Fill out (N, 2) with the real and imaginary parts of N complex normals.
+
+    words: (2 N,) uint64; work: (4, BLOCK).
     """
     for first in range(0, len(out), BLOCK):
         size = min(BLOCK, len(out) - first)
@@ -127,12 +130,14 @@ def _fill_pairs(words, work, out):
         some = out[first : first + size]
         _block(words[2 * first :], 1.0, real, imaginary, work[2, :size], work[3, :size])
         for i in range(np.uint64(size)):
-            some[i, 0], some[i, 1] = real[i], imaginary[i]
+            some[i, 0] = real[i]
+            some[i, 1] = imaginary[i]
 
 
 def interleaved(words: np.ndarray) -> np.ndarray:
-    """Return what `Draws.standard_normal` makes of raw words (2 N,) uint64: 2 N float64, real parts
-    at even places.
+    """Return the 2 N float64 that `Draws.standard_normal` makes of raw words (2 N,) uint64.
+
+    Real parts are at even positions.
     """
     out = np.empty((len(words) // 2, 2))
     # The compiler vectorises loops over contiguous real parts, but not over alternating parts.
@@ -141,8 +146,9 @@ def interleaved(words: np.ndarray) -> np.ndarray:
 
 
 def circular(words: np.ndarray, scale: float = 1.0) -> np.ndarray:
-    """Return complex normals from raw words (2 N,) uint64 as (2, N) float64, real and imaginary
-    parts.
+    """Return complex normals from raw words (2 N,) uint64 as (2, N) float64.
+
+    The rows are real and imaginary parts.
 
     Each part has mean 0 and standard deviation `scale`; the k-th number is `scale` times draws 2 k
     and 2 k + 1 of `Draws.standard_normal` on the same words.

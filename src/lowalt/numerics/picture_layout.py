@@ -1,6 +1,4 @@
-"""Rounds the positions of a figure's parts, so that equal figures give equal bytes in every
-process.
-"""
+"""Rounds positions in a figure, so that equal figures give equal bytes in every process."""
 
 from typing import TYPE_CHECKING
 
@@ -8,14 +6,14 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 DIGITS = 6
-"""Decimal places of a position relative to its figure: a thousandth of a pixel for a figure of 1000
-pixels.
+"""Decimal places of a position relative to its figure.
+
+They are a thousandth of a pixel for a figure of 1000 pixels.
 """
 
 
 def settle(figure: "Figure", dpi: float) -> None:
-    """Let the figure's layout engine place its axes and sub-figures once, then round their places
-    and switch it off.
+    """Place a figure's axes and sub-figures once, round their positions and end its layout engine.
 
     The solver of matplotlib's constrained layout orders its unknowns by memory address: the last
     bits of its answer differ from process to process, and with them a letter that stands on the
@@ -32,10 +30,11 @@ def settle(figure: "Figure", dpi: float) -> None:
     figure.set_dpi(dpi)
     figure.draw_without_rendering()
     figure.set_layout_engine("none")
-    parts = list(figure.subfigs)
-    for part in parts:
-        part.bbox_relative.set_points(part.bbox_relative.get_points().round(DIGITS))
-        parts += part.subfigs
+    waiting = list(figure.subfigs)
+    while waiting:
+        inner = waiting.pop()
+        inner.bbox_relative.set_points(inner.bbox_relative.get_points().round(DIGITS))
+        waiting += inner.subfigs
     for axes in figure.axes:
         # The drawn position, narrower if both axes have equal scales, follows from this one.
         axes.set_position(Bbox(axes.get_position(original=True).get_points().round(DIGITS)))

@@ -1,5 +1,4 @@
-"""Elementary functions, products and sums whose last bit is the same on every processor and with
-every library.
+"""Elementary functions, products and sums that give the same bits on every processor.
 
 A library may use other polynomials for a sine with wider registers, a BLAS may add in another
 order, and a fused multiply-add rounds once instead of twice. This module uses only additions,
@@ -14,7 +13,7 @@ import math
 import numpy as np
 
 _TWO_OVER_PI = 0.6366197723675814
-# Pi / 2 in parts of 33 bits: products with whole numbers below 2^20 are exact.
+# Pi / 2 in pieces of 33 bits: products with whole numbers below 2^20 are exact.
 _HALF_PI = (1.57079632673412561417, 6.07710050630396597660e-11, 2.02226624879595063154e-21)
 _LARGEST_ANGLE = 1.0e6
 SINE = (
@@ -94,9 +93,9 @@ def _turned(
     odd = (quarter & 1) == 1
     first = np.where(odd, cosine, sine)
     second = np.where(odd, sine, cosine)
-    return np.where(quarter >= 2, -first, first), np.where(
-        (quarter == 1) | (quarter == 2), -second, second
-    )
+    below = quarter >= 2
+    left = (quarter == 1) | (quarter == 2)
+    return np.where(below, -first, first), np.where(left, -second, second)
 
 
 def sine_cosine(angle_rad: np.ndarray | float) -> tuple[np.ndarray, np.ndarray]:
@@ -109,16 +108,17 @@ def sine_cosine(angle_rad: np.ndarray | float) -> tuple[np.ndarray, np.ndarray]:
         raise ValueError(f"angle of {np.abs(angle).max()} rad, expected at most {_LARGEST_ANGLE:g}")
     quarter = np.rint(angle * _TWO_OVER_PI)
     rest = angle - quarter * _HALF_PI[0]
-    part = quarter * _HALF_PI[1]
-    near = rest - part
-    part = quarter * _HALF_PI[2] - ((rest - near) - part)
-    high = near - part
-    return _turned(quarter, *_eighth(high, (near - high) - part))
+    middle_piece = quarter * _HALF_PI[1]
+    near = rest - middle_piece
+    last_piece = quarter * _HALF_PI[2] - ((rest - near) - middle_piece)
+    high = near - last_piece
+    return _turned(quarter, *_eighth(high, (near - high) - last_piece))
 
 
 def sine_cosine_turns(turns: np.ndarray | float) -> tuple[np.ndarray, np.ndarray]:
-    """Return sine and cosine of 2 pi `turns`, below 2^50, of any shape; quarter turns give exactly
-    0 and +-1.
+    """Return sine and cosine of 2 pi `turns`, below 2^50, of any shape.
+
+    Quarter turns give exactly 0 and +-1.
     """
     turns = np.asarray(turns, np.float64)
     quarter = np.rint(4.0 * turns)
@@ -185,7 +185,7 @@ def arctan(x: np.ndarray | float) -> np.ndarray:
     x = np.asarray(x, np.float64)
     size = np.abs(x)
     limits = (0.4375, 0.6875, 1.1875, 2.4375)
-    place = sum((size >= limit).astype(np.int64) for limit in limits)
+    interval = sum((size >= limit).astype(np.int64) for limit in limits)
     # Every branch is computed for all numbers, so divisors must not be zero in unused branches
     # either.
     choices = [
@@ -195,18 +195,19 @@ def arctan(x: np.ndarray | float) -> np.ndarray:
         (size - 1.5) / (1 + 1.5 * size),
         -1 / np.where(size > 0, size, 1.0),
     ]
-    near = np.choose(place, choices)
+    near = np.choose(interval, choices)
     square = near * near
     tail = near * (square * _polynomial(square, TANGENT))
-    high = np.choose(place, [0.0, *(anchor[0] for anchor in _ANCHORS)])
-    low = np.choose(place, [0.0, *(anchor[1] for anchor in _ANCHORS)])
-    result = np.where(place == 0, near - tail, high - ((tail - low) - near))
+    high = np.choose(interval, [0.0, *(anchor[0] for anchor in _ANCHORS)])
+    low = np.choose(interval, [0.0, *(anchor[1] for anchor in _ANCHORS)])
+    result = np.where(interval == 0, near - tail, high - ((tail - low) - near))
     return np.where(x < 0, -result, result)
 
 
 def arctan2(y: np.ndarray | float, x: np.ndarray | float) -> np.ndarray:
     """Return the angle (rad) of the points (x, y), in [-pi, pi]; 0 at the origin."""
-    y, x = np.asarray(y, np.float64), np.asarray(x, np.float64)
+    y = np.asarray(y, np.float64)
+    x = np.asarray(x, np.float64)
     steep = np.abs(y) > np.abs(x)
     over = np.where(steep, x, y)
     under = np.where(steep, y, x)
@@ -228,8 +229,9 @@ def mean(values: np.ndarray, axis: int = -1) -> np.ndarray:
 
 
 def dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Return the sum over the last axis of a b, added from the first product on; other axes
-    broadcast.
+    """Return the sum over the last axis of a b.
+
+    Products are added from the first one on; other axes broadcast.
     """
     a = np.asarray(a, np.float64)
     b = np.asarray(b, np.float64)
@@ -245,8 +247,9 @@ def norm(vectors: np.ndarray) -> np.ndarray:
 
 
 def product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Return the matrix product of (..., I, K) and (..., K, J): (..., I, J), added from the first k
-    on.
+    """Return the matrix product of (..., I, K) and (..., K, J): (..., I, J).
+
+    Products are added from the first k on.
     """
     a = np.asarray(a, np.float64)
     b = np.asarray(b, np.float64)
@@ -267,14 +270,13 @@ def rms(signal: np.ndarray) -> float:
     Scaling by a power of two first prevents under- and overflow of the mean square.
     """
     signal = np.asarray(signal, dtype=np.complex128).ravel()
-    parts = np.stack([signal.real, signal.imag])
-    peak = float(np.abs(parts).max())
+    real_imag = np.stack([signal.real, signal.imag])
+    peak = float(np.abs(real_imag).max())
     if peak == 0:
         return 0.0
     twos = math.frexp(peak)[1]
-    parts = np.ldexp(parts, -twos)
-    # Square the parts separately and add one by one, because a library's |z| and sum depend on the
+    real, imag = np.ldexp(real_imag, -twos)
+    # Square both separately and add one by one, because a library's |z| and sum depend on the
     # processor.
-    return math.ldexp(
-        math.sqrt(float(total(parts[0] * parts[0] + parts[1] * parts[1])) / signal.size), twos
-    )
+    mean_square = float(total(real * real + imag * imag)) / signal.size
+    return math.ldexp(math.sqrt(mean_square), twos)

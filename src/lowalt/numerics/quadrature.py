@@ -12,8 +12,9 @@ STEPS = 6
 
 @lru_cache(maxsize=256)
 def gauss_legendre(count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the nodes (count,) on [-1, 1], rising, and their weights, whose sum is 2. They must
-    not be changed.
+    """Return the nodes (count,) on [-1, 1], rising, and their weights, whose sum is 2.
+
+    They must not be changed.
 
     Source: Newton's method on the Legendre polynomial from Tricomi's guess, DLMF 18.16.
     """

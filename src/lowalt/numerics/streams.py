@@ -40,8 +40,9 @@ def digest(seed: int, purpose: str, *keys: Key) -> bytes:
 
 
 def stream(seed: int, purpose: str, *keys: Key) -> Draws:
-    """Return the generator of the stream (seed, purpose, *keys): NumPy's PCG64 seeded by SHA-256,
-    read by `Draws`.
+    """Return the generator of the stream (seed, purpose, *keys).
+
+    It is NumPy's PCG64 seeded by SHA-256, read by `Draws`.
 
     Raises: TypeError for a key that is no str, int or float.
     Source: NumPy's SeedSequence takes entropy of any size; with 256 bits, two equal streams do not
@@ -50,5 +51,7 @@ def stream(seed: int, purpose: str, *keys: Key) -> Draws:
     words = np.frombuffer(digest(seed, purpose, *keys), "<u4")
     # SeedSequence splits an integer into words without leading zeros. Passing these words saves a
     # third of its time.
-    entropy = words.astype(np.uint32) if words[-1] else int.from_bytes(words.tobytes(), "little")
+    entropy: np.ndarray | int = words.astype(np.uint32)
+    if words[-1] == 0:
+        entropy = int.from_bytes(words.tobytes(), "little")
     return Draws(np.random.PCG64(np.random.SeedSequence(entropy)))

@@ -29,12 +29,12 @@ def _views(arguments: list[str]) -> None:
     options = line.parse_args(arguments)
     if (options.reduced is None) != (options.motion is None):
         raise InputError("expected both --reduced and --motion, or neither")
-    size, *levels = pick(options.settings, "size", *(["snr_db"] if options.reduced else []))
-    source = (
-        Reduced(Path(options.reduced), Path(options.motion), tuple(map(float, levels[0])))
-        if levels
-        else None
-    )
+    source = None
+    if options.reduced:
+        size, snrs_db = pick(options.settings, "size", "snr_db")
+        source = Reduced(Path(options.reduced), Path(options.motion), tuple(map(float, snrs_db)))
+    else:
+        (size,) = pick(options.settings, "size")
     count = cache_shard(options.index, options.shard, size, options.out, source)
     print(f"{options.out}: {count} samples", file=sys.stderr)
 
@@ -81,7 +81,7 @@ def _source(options: Namespace):
 
     for sums in options.frozen:
         verify(sums)
-    if sum(place is not None for place in (options.views, options.index, options.dataset)) != 1:
+    if sum(source is not None for source in (options.views, options.index, options.dataset)) != 1:
         raise InputError("expected one of --views, --index and --dataset")
     if options.dataset is None:
         return Source(options.views, options.index)
@@ -91,8 +91,10 @@ def _source(options: Namespace):
 
 
 def _train(arguments: list[str]) -> None:
-    """Train one scheme in one protocol. Settings: scheme, seed, size, colour_map, network,
-    training, augmentation, classes."""
+    """Train one scheme in one protocol.
+
+    Settings: scheme, seed, size, colour_map, network, training, augmentation, classes.
+    """
     from lowalt.recognition.runs import train
 
     line = parser("lowalt.recognition train", _train.__doc__)
@@ -114,8 +116,9 @@ def _train(arguments: list[str]) -> None:
 
 
 def _evaluate(arguments: list[str]) -> None:
-    """Predict all validation and test samples of a model's protocol. Settings: batch, threads,
-    precision, mirror.
+    """Predict all validation and test samples of a model's protocol.
+
+    Settings: batch, threads, precision, mirror.
     """
     from lowalt.recognition.runs import evaluate, load
 
@@ -187,9 +190,9 @@ def _transfer(arguments: list[str]) -> None:
     first, *others = map(load_yaml, options.configs)
     for other in others:
         transfer.check_folds(first, other)
-    own = [Evaluated(path) for path in options.own]
-    other = [Evaluated(path) for path in options.other]
-    transfer.write(own, other, names(options.schemes), options.out, seed)
+    own_models = [Evaluated(path) for path in options.own]
+    other_models = [Evaluated(path) for path in options.other]
+    transfer.write(own_models, other_models, names(options.schemes), options.out, seed)
 
 
 def _distances(arguments: list[str]) -> None:

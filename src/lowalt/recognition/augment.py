@@ -14,8 +14,10 @@ from lowalt.spectra.catalogue import NAMES, zero_index
 
 
 def _contrast(exponents: np.ndarray, zero: int) -> np.ndarray:
-    """Return tables (samples, 256) uint8 that raise the distance from the zero index to powers
-    (samples,); the ends stay."""
+    """Return tables (samples, 256) uint8 that raise the distance from the zero index to powers.
+
+    exponents: the powers, (samples,). The ends stay.
+    """
     index = np.arange(256) - zero
     reach = 255 - zero
     values = zero + np.sign(index) * reach * (np.abs(index) / reach) ** exponents[:, None]
@@ -25,26 +27,28 @@ def _contrast(exponents: np.ndarray, zero: int) -> np.ndarray:
 def _moved(
     images: np.ndarray, mirror: np.ndarray, down: np.ndarray, right: np.ndarray
 ) -> np.ndarray:
-    """Return images (samples, views, rows, columns) turned around along rows, where `mirror`
-    (samples,) says so, then shifted cyclically by `down` and `right` (samples,) pixels."""
+    """Return images (samples, views, rows, columns) mirrored along rows and shifted cyclically.
+
+    mirror: (samples,), which to mirror; down, right: shifts (samples,) in pixels.
+    """
     samples, views, rows, columns = images.shape
     row = (np.arange(rows) - down[:, None]) % rows
     column = (np.arange(columns) - right[:, None]) % columns
     row = np.where(mirror[:, None], rows - 1 - row, row)
     pixel = (row[:, :, None] * columns + column[:, None]).reshape(samples, -1)
     result = np.empty((samples, views, rows * columns), images.dtype)
-    for image, place, moved in zip(images.reshape(result.shape), pixel, result, strict=True):
-        # All places are in range. With this mode numpy does not check each of them.
-        image.take(place, axis=1, out=moved, mode="wrap")
+    for image, source, moved in zip(images.reshape(result.shape), pixel, result, strict=True):
+        # All pixels are in range. With this mode numpy does not check each of them.
+        image.take(source, axis=1, out=moved, mode="wrap")
     return result.reshape(images.shape)
 
 
 def augment(
     images: np.ndarray, columns: list[int], block: dict, generator: np.random.Generator
 ) -> np.ndarray:
-    """Return changed copies of index images (samples, views, rows, columns) uint8; rows are
-    Doppler, columns time.
+    """Return changed copies of index images (samples, views, rows, columns) uint8.
 
+    Rows are Doppler, columns time.
     columns: numbers of their views (`Scheme.columns`). Equal generators give equal changes.
     """
     samples, views, rows, width = images.shape
@@ -72,7 +76,9 @@ def augment(
         strip = int(of_strip * block["mask_time"] * width)
         top = int(of_top * (rows - band + 1))
         left = int(of_left * (width - strip + 1))
-        drop = drops[number] if not drops[number].all() else np.zeros(views, dtype=bool)
+        drop = drops[number]
+        if drop.all():
+            drop = np.zeros(views, dtype=bool)
         if not (band or strip or drop.any()):
             continue
         for view, zero in enumerate(zeros):

@@ -1,5 +1,4 @@
-"""The batches of a training and an evaluation: the order of samples in an epoch, and worker
-processes that read ahead.
+"""The batches of training and evaluation: the order of samples, and processes that read ahead.
 
 The order depends only on seed and epoch, so an interrupted training resumes at any step. Workers
 start once and live as long as their reader, not once per epoch.
@@ -40,9 +39,7 @@ def epoch_order(
 
 
 def batches(order: np.ndarray, size: int) -> list[np.ndarray]:
-    """Cut an epoch's order into full batches; a shorter last one is left out unless it is the only
-    one.
-    """
+    """Cut an epoch's order into full batches, or one shorter batch if there is no full one."""
     full = len(order) // size
     if full == 0:
         return [order]
@@ -51,17 +48,13 @@ def batches(order: np.ndarray, size: int) -> list[np.ndarray]:
 
 def tensors(arrays: Any) -> Any:
     """Return an array, or every array of a named tuple, as a tensor."""
-    return (
-        type(arrays)(*map(torch.from_numpy, arrays))
-        if isinstance(arrays, tuple)
-        else torch.from_numpy(arrays)
-    )
+    if isinstance(arrays, tuple):
+        return type(arrays)(*map(torch.from_numpy, arrays))
+    return torch.from_numpy(arrays)
 
 
 class Unchanged(Dataset):
-    """Index images of samples as they are: the map from sample numbers to a batch that evaluation
-    reads.
-    """
+    """The map from sample numbers to a batch that evaluation reads: index images as they are."""
 
     def __init__(self, source: Samples) -> None:
         """Take the samples."""
@@ -78,9 +71,11 @@ class Augmented(Dataset):
     def __init__(
         self, source: Samples, columns: list[int], block: dict, keys: tuple, rank: int, ranks: int
     ) -> None:
-        """columns: views of the samples; block: `recognition.augmentation`; keys: seed and names of
-        the random stream;
-        rank, ranks: the share of each batch that is read here."""
+        """Take the samples and how they are changed.
+
+        columns: views of the samples; block: `recognition.augmentation`; keys: seed and names of
+        the random stream; rank, ranks: the share of each batch that is read here.
+        """
         self.source = source
         self.columns = columns
         self.block = block
@@ -89,8 +84,10 @@ class Augmented(Dataset):
         self.ranks = ranks
 
     def __getitem__(self, item: tuple[int, np.ndarray]) -> tuple[Any, torch.Tensor]:
-        """Return this rank's share of a batch: index images (B, views, S, S) uint8, or what else
-        the source gives, and labels (B,)."""
+        """Return this rank's share of a batch, and its labels (B,).
+
+        It holds index images (B, views, S, S) uint8, or what else the source gives.
+        """
         step, numbers = item
         mine = numbers[self.rank :: self.ranks]
         seed, *names = self.keys
@@ -100,9 +97,7 @@ class Augmented(Dataset):
 
 
 class Prefetch:
-    """Calls a map for one item after the other, in worker processes where there are any, and keeps
-    their order.
-    """
+    """Calls a map for one item after the other, in worker processes if there are any, in order."""
 
     def __init__(self, read: Dataset, workers: int, pin: bool) -> None:
         """read: map from an item to a batch; workers: processes that call it, 0 for this one; pin:

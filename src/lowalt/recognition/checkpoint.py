@@ -1,5 +1,4 @@
-"""Checkpoints: written atomically. A damaged checkpoint, or one of another run, is refused with an
-error.
+"""Checkpoints, written atomically; a damaged one, or one of another run, is refused.
 
 A file holds {"identity": JSON text, "digest": SHA-256 of every tensor, ...state}. The identity
 holds everything that determines the weights (settings, scheme, protocol, samples). A training
@@ -8,22 +7,39 @@ resumes only from a file of its own identity.
 
 import hashlib
 import json
+import math
+import zipfile
 from pathlib import Path
 
 import torch
 
 from lowalt.config.schema import check_brought
+from lowalt.files.array_files import most_expanded
 from lowalt.files.atomic import existing, replacing
 from lowalt.files.errors import InputError, in_one_line, shown
 from lowalt.files.json_objects import json_object
 
+VALUE_BYTES = 100
+"""A value of a state counts as at least this many bytes."""
 
-def _digest(state: object) -> str:
-    """SHA-256 of all values of a state, in their order."""
+
+def _digest(state: object, most: float = math.inf) -> str:
+    """SHA-256 of all values of a state, in their order.
+
+    Raises: ValueError for more than `most` bytes: lists that hold one list twice, level upon level,
+    make billions of values of a few bytes.
+    """
     hasher = hashlib.sha256()
+    total = 0
 
     def walk(value: object) -> None:
         """Feed a value, and all values inside it, to the hasher."""
+        nonlocal total
+        total += VALUE_BYTES
+        if isinstance(value, torch.Tensor):
+            total += value.numel() * value.element_size()
+        if total > most:
+            raise ValueError(f"values of more than {most} bytes")
         if isinstance(value, torch.Tensor):
             # A tensor with stride 0 can claim more elements than its storage has; refuse it.
             if value.numel() * value.element_size() > value.untyped_storage().nbytes():
@@ -73,14 +89,18 @@ def load(path: str | Path, name: str | None = None) -> tuple[str, dict]:
     Raises: InputError naming the file where it is missing, damaged, or of another run (with the
     parts that differ).
     """
-    existing(path, "checkpoint")
+    most = most_expanded(existing(path, "checkpoint").stat().st_size)
     try:
+        if zipfile.is_zipfile(path):
+            with zipfile.ZipFile(path) as archive:
+                if sum(member.file_size for member in archive.infolist()) > most:
+                    raise ValueError(f"its members expand to more than {most} bytes")
         # Load tensors and plain values only, so that a checkpoint from elsewhere cannot run code.
         content = torch.load(path, map_location="cpu", weights_only=True)
         stored = content["identity"]
         digest = content["digest"]
         state = content["state"]
-        computed = _digest(state)
+        computed = _digest(state, most)
         named = isinstance(stored, str)
     except Exception as error:
         # For damaged bytes torch's reader raises almost any exception.
@@ -102,15 +122,15 @@ def load(path: str | Path, name: str | None = None) -> tuple[str, dict]:
 
 
 def check_model(facts: dict, settings: dict, path: str | Path) -> None:
-    """Refuse a model file whose settings are wrong, or contradict the identity under which it was
-    trained.
+    """Refuse a model file whose settings are wrong or contradict the identity of its training.
 
     facts: its identity; settings: of its network; path: the file. Raises: InputError naming the
     setting that is wrong.
     """
     check_brought("model", settings, path)
     trained = facts.get("settings")
-    trained = trained if isinstance(trained, dict) else {}
+    if not isinstance(trained, dict):
+        trained = {}
     named = {
         "network": trained,
         "size": trained,

@@ -38,8 +38,7 @@ recent ones are kept.
 
 
 def opened(config: str | Path) -> Dataset:
-    """Return the data set of a run by its config.yaml, with the clouds and surfaces that stand next
-    to it.
+    """Return the data set of a run by its config.yaml, with the clouds and surfaces next to it.
 
     Raises: InputError naming what is missing or wrong.
     """
@@ -47,7 +46,8 @@ def opened(config: str | Path) -> Dataset:
 
     folder = Path(config).parent
     surfaces = sorted((folder / "occluders").glob("*.npz"))
-    return Dataset(config, folder / "clouds", occluders=read_all(surfaces) if surfaces else None)
+    occluders = read_all(surfaces) if surfaces else None
+    return Dataset(config, folder / "clouds", occluders=occluders)
 
 
 def cloud_sha256(cloud: Cloud) -> str:
@@ -61,12 +61,14 @@ def cloud_sha256(cloud: Cloud) -> str:
 
 
 def stations_of(maker: Maker, columns: list[int]) -> list[int] | None:
-    """Return the numbers of the stations that the images show; None (all) where they show range
-    cells.
+    """Return the numbers of the stations that the images show; None for all.
+
+    Images of range cells need all stations.
     """
     spectra = Spectra.from_settings(maker.render["spectra"])
-    shown = sorted({number // len(spectra) for number in columns})
-    return None if of_cells(spectra) else shown
+    if of_cells(spectra):
+        return None
+    return sorted({number // len(spectra) for number in columns})
 
 
 def views_of(
@@ -88,11 +90,11 @@ def views_of(
 def images_of(
     maker: Maker, row: dict, snr_db: float, signal: np.ndarray, columns: list[int], size: int
 ) -> np.ndarray:
-    """Return the index images (len(columns), size, size) uint8 of a sample's signal (stations,
-    symbols).
-    """
+    """Return the index images (len(columns), size, size) uint8 of a signal (stations, symbols)."""
     images = maker.renderer.some(signal, columns, maker.late(row), maker.shown(row, snr_db, signal))
-    return images if images.shape[-1] == size else resize(images, size)
+    if images.shape[-1] == size:
+        return images
+    return resize(images, size)
 
 
 class DatasetSamples(samples.Samples):
@@ -101,7 +103,9 @@ class DatasetSamples(samples.Samples):
     def __init__(
         self, dataset: Dataset, columns: list[int], folds: set, size: int, placed: bool
     ) -> None:
-        """columns: views to keep; folds: (group, fold) pairs; size: pixels; placed: whether facts
+        """Take a data set and choose views and folds of it.
+
+        columns: views to keep; folds: (group, fold) pairs; size: pixels; placed: whether facts
         carry ranges and aspects.
 
         The clean echoes of all motion models are computed here, once, if they fit into CLEAN_BYTES.
@@ -115,16 +119,16 @@ class DatasetSamples(samples.Samples):
             columns, named(dataset.maker.render["spectra"]), stations, "dataset"
         )
         self.stations = stations_of(dataset.maker, self.columns)
-        self.rows = []
-        self.chosen = []
-        parts = []
+        self.rows: list[dict] = []
+        self.chosen: list[tuple[int, float]] = []
+        of_shards = []
         for name in sorted(dataset.plan.shards, key=lambda shard: f"{shard}.tar"):
-            group, fold, part = name.split("-")
+            group, fold, number = name.split("-")
             if (group, fold) in folds:
-                parts.append(self._shard(f"{group}-{part}", fold, placed))
+                of_shards.append(self._shard(f"{group}-{number}", fold, placed))
         if not self.chosen:
             raise InputError(f"dataset: no samples of {sorted(folds)}")
-        self.facts = samples.joined(parts)
+        self.facts = samples.joined(of_shards)
         self._prepare()
 
     def _shard(self, chunk: str, fold: str, placed: bool) -> Facts:
@@ -137,20 +141,20 @@ class DatasetSamples(samples.Samples):
         chosen = select(rows, list(levels), plan.split, plan.seed, fold)
         self.rows += rows
         self.chosen += [(first + number, levels[level]) for number, level in chosen]
-        blank = [math.nan] * len(network.stations)
-        places = []
-        for number, level in chosen if placed else ():
-            entry = json.loads(
-                record(rows[number], levels[level], fold, plan.seed, network, self.dataset.classes)
-            )
-            places.append(geometry(entry, network))
-        places = places or [(blank, blank)] * len(chosen)
-        models = [rows[number] for number, _ in chosen]
-        snrs = [levels[level] for _, level in chosen]
-        keys = [
-            sample_key(row["subtype"], row["model"], snr)
-            for row, snr in zip(models, snrs, strict=True)
-        ]
+        models = []
+        snrs = []
+        keys = []
+        ranges = np.full((len(chosen), len(network.stations)), math.nan)
+        aspects = ranges.copy()
+        for sample, (number, level) in enumerate(chosen):
+            row = rows[number]
+            snr_db = levels[level]
+            models.append(row)
+            snrs.append(snr_db)
+            keys.append(sample_key(row["subtype"], row["model"], snr_db))
+            if placed:
+                text = record(row, snr_db, fold, plan.seed, network, self.dataset.classes)
+                ranges[sample], aspects[sample] = geometry(json.loads(text), network)
         return Facts(
             key=np.array(keys),
             subtype=np.array([row["subtype"] for row in models]),
@@ -159,8 +163,8 @@ class DatasetSamples(samples.Samples):
             group=np.array([row["group"] for row in models]),
             fold=np.array([fold] * len(models)),
             label=np.array([label(self.dataset.classes, row) for row in models], np.int64),
-            range_m=np.array([place[0] for place in places]).reshape(len(models), -1),
-            aspect_rad=np.array([place[1] for place in places]).reshape(len(models), -1),
+            range_m=ranges,
+            aspect_rad=aspects,
         )
 
     def _prepare(self) -> None:
@@ -170,8 +174,11 @@ class DatasetSamples(samples.Samples):
             # The echoes of such a scene hold the noise of one SNR, so other SNRs cannot use them.
             return
         used = sorted({number for number, _ in self.chosen})
-        heard = len(maker.network.stations if self.stations is None else self.stations)
-        if 8 * heard * maker.network.symbols * len(used) <= CLEAN_BYTES:
+        stations = len(maker.network.stations)
+        if self.stations is not None:
+            stations = len(self.stations)
+        echo_bytes = np.dtype(np.complex64).itemsize * stations * maker.network.symbols
+        if echo_bytes * len(used) <= CLEAN_BYTES:
             maker.kept = max(maker.kept, len(used))
             for number in reported(used, len(used), "models"):
                 maker.received(self.rows[number], stations=self.stations)
@@ -186,32 +193,29 @@ class DatasetSamples(samples.Samples):
         maker = self.dataset.maker
         images = []
         for number in numbers:
-            place, snr_db = self.chosen[number]
-            images.append(
-                views_of(maker, self.rows[place], snr_db, self.columns, self.size, self.stations)
-            )
+            index, snr_db = self.chosen[number]
+            row = self.rows[index]
+            images.append(views_of(maker, row, snr_db, self.columns, self.size, self.stations))
         return np.stack(images)
 
     def sha256(self) -> str:
-        """Return the SHA-256 of all that a training uses of these samples: clouds, rows and
-        settings instead of images.
+        """Return the SHA-256 of all that a training uses of these samples.
 
+        Clouds, rows and settings stand for the images.
         The same samples from shards or a cache have another sum.
         """
         maker = self.dataset.maker
-        subtypes = sorted({self.rows[place]["subtype"] for place, _ in self.chosen})
-        clouds = {name: self.dataset.clouds[name] for name in subtypes}
-        sums = {name: cloud_sha256(cloud) for name, cloud in clouds.items()}
-        rows = hashlib.sha256(
-            json.dumps([self.rows[place] for place, _ in self.chosen], sort_keys=True).encode()
-        )
+        rows = [self.rows[index] for index, _ in self.chosen]
+        sums = {}
+        for name in sorted({row["subtype"] for row in rows}):
+            sums[name] = cloud_sha256(self.dataset.clouds[name])
+        rows_sha256 = hashlib.sha256(json.dumps(rows, sort_keys=True).encode()).hexdigest()
         settings = {
             "size": self.size,
             "columns": self.columns,
             "render": maker.render,
             "echo": maker.echo,
         }
-        described = json.dumps(
-            [settings, self.dataset.plan.seed, sums, rows.hexdigest()], sort_keys=True
-        )
+        seed = self.dataset.plan.seed
+        described = json.dumps([settings, seed, sums, rows_sha256], sort_keys=True)
         return samples.fingerprint(self.facts, described.encode())

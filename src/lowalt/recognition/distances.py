@@ -1,21 +1,20 @@
-"""Distances between the subtypes of a category: whether an easy unseen subtype is nearly a copy of
-a trained one.
+"""Distances between subtypes of a category: is an easy unseen subtype nearly a trained one?
 
 A subtype is represented by the points that its cloud sweeps over one cycle (a turn, a beat, a
-recording) in its own
-frame: shape and own motion, which together cause the micro-Doppler. Each set of points is centred
-and divided by its root mean square radius; the energy distance of two sets then compares their
-form, and the ratio of their radii is given as the ratio of size. The energy distance is a metric,
-is zero for equal distributions only, needs no correspondence and no grid, and changes little by one
-stray point, unlike the Hausdorff distance (Szekely and Rizzo, J. Stat. Plan. Inference 143, 2013).
+recording) in its own frame: shape and own motion, which together cause the micro-Doppler. Each set
+of points is centred and divided by its root mean square radius; the energy distance of two sets
+then compares their form, and the ratio of their radii is given as the ratio of size. The energy
+distance is a metric, is zero for equal distributions only, needs no correspondence and no grid, and
+changes little by one stray point, unlike the Hausdorff distance (Szekely and Rizzo, J. Stat. Plan.
+Inference 143, 2013).
 
 distances.csv, one row per subtype:
     category, subtype, group
-    nearest, distance, size_ratio                the nearest other subtype of the category
-    nearest_trained, trained_distance, trained_size_ratio    the same among the subtypes of the
-    group seen, on which the
-                                                 unseen protocol trains; of a trained subtype,
-                                                 another one
+    nearest, distance, size_ratio
+        the nearest other subtype of the category
+    nearest_trained, trained_distance, trained_size_ratio
+        the same among the subtypes of the group seen, on which the unseen protocol trains; of a
+        trained subtype, another one
 """
 
 from itertools import combinations
@@ -46,25 +45,31 @@ POINTS = 1200
 
 
 def still_row(row: dict) -> dict:
-    """Return the motion row without place, velocity and attitude, so that only the parts' own
-    motion is left.
-    """
+    """Return the motion row with the parts' own motion only: no position, velocity or attitude."""
     names = ("x_m", "y_m", "z_m", "vx_mps", "vy_mps", "vz_mps", "yaw_rad", "pitch_rad", "roll_rad")
-    return {name: 0.0 if name in (*names, *PATH) else value for name, value in row.items()}
+    result = dict(row)
+    for name in (*names, *PATH):
+        if name in result:
+            result[name] = 0.0
+    return result
 
 
 def cycle_s(cloud: Cloud, row: dict) -> float:
-    """Return the time of one cycle (s): a turn, a beat, or the whole recording; a second where
-    nothing turns.
+    """Return the time of one cycle (s): a turn, a beat, or the whole recording.
+
+    It is a second where nothing turns.
     """
     if len(cloud.track):
         return len(cloud.track) / cloud.record["track_rate_hz"] / row["playback"]
-    return 1.0 / row["rate_hz"] if row["rate_hz"] > 0 else 1.0
+    if row["rate_hz"] > 0:
+        return 1.0 / row["rate_hz"]
+    return 1.0
 
 
 def swept(cloud: Cloud, row: dict) -> np.ndarray:
-    """Points (at most 1200, 3) m that a cloud sweeps over one cycle in its own frame, evenly taken
-    from all of them.
+    """Points (at most 1200, 3) m that a cloud sweeps over one cycle in its own frame.
+
+    They are taken evenly from all points.
     """
     times = np.arange(INSTANTS) / INSTANTS * cycle_s(cloud, row)
     points = positions(cloud, still_row(row), times).reshape(-1, 3)
@@ -83,8 +88,7 @@ def energy_distance(first: np.ndarray, second: np.ndarray) -> float:
 
 
 def form(points: np.ndarray) -> tuple[np.ndarray, float]:
-    """Return points (n, 3) centred and divided by their root mean square radius, and that radius
-    (m).
+    """Return points (n, 3) centred and divided by their root mean square radius, and that (m).
 
     Raises: InputError where all points coincide.
     """
@@ -96,9 +100,9 @@ def form(points: np.ndarray) -> tuple[np.ndarray, float]:
 
 
 def rows(clouds: list[Cloud], motion: list[dict]) -> list[list]:
-    """Return the rows of distances.csv by category and subtype; `motion` holds at least one row of
-    every subtype.
+    """Return the rows of distances.csv by category and subtype.
 
+    motion: at least one row of every subtype.
     Raises: InputError for a cloud without a motion row.
     """
     first: dict[str, dict] = {}

@@ -1,6 +1,4 @@
-"""Evaluated schemes, read from prediction files and the records next to them, and differences
-between schemes.
-"""
+"""Evaluated schemes, read from prediction files and their records, and differences between them."""
 
 from pathlib import Path
 
@@ -18,9 +16,10 @@ class Evaluated:
     """One evaluated scheme: its predictions and the record of the run."""
 
     def __init__(self, path: str | Path) -> None:
-        """path: the prediction file; the JSON file next to it holds protocol, scheme, seed and
-        hardware.
+        """Read a prediction file and the record next to it.
 
+        path: the prediction file; the JSON file next to it holds protocol, scheme, seed and
+        hardware.
         Raises: InputError where either is missing or the test part is empty.
         """
         self.about = about = predictions.record(path)

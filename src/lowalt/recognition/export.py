@@ -1,6 +1,4 @@
-"""A trained model for others: its weights and records as safetensors with a card, or a format that
-an extension writes.
-"""
+"""A trained model for others: weights, records and a card, or a format that an extension writes."""
 
 from pathlib import Path
 
@@ -13,9 +11,9 @@ OWN = ".safetensors"
 
 
 def export(trained: Trained, out: str | Path) -> None:
-    """Write the model's weights and records (.safetensors) with a card (.md) next to them, or as
-    the extension that offers the suffix writes it.
+    """Write the model's weights and records (.safetensors) with a card (.md) next to them.
 
+    For another suffix, the extension that offers it writes the model.
     Raises: InputError for a suffix that nobody writes, or as the extension does.
     """
     suffix = Path(out).suffix

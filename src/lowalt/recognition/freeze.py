@@ -1,6 +1,6 @@
-"""Frozen inputs: the checksums of clouds and motion tables, written before the first training and
-checked before every later use.
+"""Frozen inputs: checksums of clouds and motion tables, checked before every use.
 
+They are written before the first training.
 The file has the form of `sha256sum`, so `sha256sum --check SHA256SUMS` verifies it without our
 code.
 """

@@ -1,11 +1,12 @@
-"""Fusion: how the tokens of all views become one decision. Attention is the paper's proposal, mean
-its baseline.
+"""Fusion: how the tokens of all views become one decision.
 
+Attention is the paper's proposal, mean its baseline.
 Axes: B samples, K stations, V views of a station, then features. A fusion offers
     forward        tokens (B, K, V, features) -> fused feature (B, width)
     decided        tokens and the classifier -> logits (B, classes)
     each_station   tokens (B, K, V, features) -> tokens of B * K samples, each as if one station
-    were the only one both           the logits of all stations together, and of each alone
+                   were the only one
+    both           the logits of all stations together, and of each alone
 """
 
 from collections.abc import Callable
@@ -17,8 +18,9 @@ from lowalt.files.errors import InputError
 
 
 def encoder(width: int, depth: int, heads: int, feed_forward: float, dropout: float) -> nn.Module:
-    """Return a transformer encoder of `depth` layers over tokens of `width` features; the identity
-    for depth 0.
+    """Return a transformer encoder of `depth` layers over tokens of `width` features.
+
+    It is the identity for depth 0.
     """
     if depth == 0:
         return nn.Identity()
@@ -54,16 +56,12 @@ class Fusion(nn.Module):
     def both(
         self, tokens: torch.Tensor, classifier: nn.Module
     ) -> tuple[torch.Tensor, torch.Tensor]:
-        """Tokens (B, K, V, features) -> logits (B, classes), and (B * K, classes) of each station
-        alone.
-        """
+        """Tokens (B, K, V, features) -> logits (B, classes), and (B * K, classes) per station."""
         return self.decided(tokens, classifier), self.decided(self.each_station(tokens), classifier)
 
 
 class AttentionFusion(Fusion):
-    """The paper's fusion: spectra of a station by encoder and mean pool, stations by encoder and
-    max pool.
-    """
+    """The paper's fusion: encoder and mean pool over spectra, then encoder and max pool."""
 
     def __init__(self, width: int, views: int, block: dict) -> None:
         """width: features of a token; views: of a station; block: the network's settings.
@@ -97,8 +95,9 @@ class AttentionFusion(Fusion):
     def both(
         self, tokens: torch.Tensor, classifier: nn.Module
     ) -> tuple[torch.Tensor, torch.Tensor]:
-        """As `Fusion.both`. The encoder over spectra runs once, except where dropout draws anew for
-        each part.
+        """Compute `Fusion.both`.
+
+        The encoder over spectra runs once, except where dropout draws anew for the two results.
         """
         if self.draws and self.training:
             return super().both(tokens, classifier)
@@ -127,8 +126,9 @@ network's settings.
 
 
 class Fused(nn.Module):
-    """A network of tokens, fusion and classifier; a subclass makes `backbone` and says how inputs
-    become tokens.
+    """A network of tokens, fusion and classifier.
+
+    A subclass makes `backbone` and says how inputs become tokens.
     """
 
     def add_head(

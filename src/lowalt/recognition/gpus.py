@@ -27,17 +27,18 @@ def _opened(name: str) -> int:
 
 @functools.cache
 def claimed(names: tuple[str, ...]) -> int:
-    """Return the place in `names` (UUIDs) of a GPU that is this process's own until it ends; wait
-    until one is free.
+    """Wait for a GPU of this process's own and return its index in `names` (UUIDs).
+
+    No other job has that GPU until this process ends.
     """
     waiting = False
     while True:
-        for place, name in enumerate(names):
+        for index, name in enumerate(names):
             descriptor = _opened(name)
             try:
                 # The lock lasts as long as this descriptor, which stays open.
                 fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                return place
+                return index
             except BlockingIOError:
                 os.close(descriptor)
         if not waiting:

@@ -1,6 +1,4 @@
-"""Class probabilities of a network, on one machine or several ranks; any number of ranks gives the
-same bits.
-"""
+"""Class probabilities of a network; any number of ranks gives the same bits."""
 
 import contextlib
 import hashlib
@@ -21,8 +19,7 @@ from lowalt.recognition.samples import Samples
 
 
 def arithmetic(precision: str, device: str) -> str:
-    """Return "bf16" or "fp32" for a setting: "auto" is bf16 where the hardware has bf16
-    multipliers.
+    """Return "bf16" or "fp32" for a setting; "auto" is bf16 where the hardware multiplies it.
 
     device: "cpu" or "cuda". A processor without such units emulates bf16 and takes ten times as
     long as in fp32.
@@ -30,19 +27,17 @@ def arithmetic(precision: str, device: str) -> str:
     if precision != "auto":
         return precision
     if device == "cuda":
-        return "bf16" if torch.cuda.is_bf16_supported(including_emulation=False) else "fp32"
-    known = torch.cpu.get_capabilities()
-    # Arm processors use other names for these units.
-    return (
-        "bf16" if any(known.get(unit) for unit in ("amx_bf16", "avx512_bf16", "bf16")) else "fp32"
-    )
+        has_units = torch.cuda.is_bf16_supported(including_emulation=False)
+    else:
+        known = torch.cpu.get_capabilities()
+        # Arm processors use other names for these units.
+        has_units = any(known.get(unit) for unit in ("amx_bf16", "avx512_bf16", "bf16"))
+    return "bf16" if has_units else "fp32"
 
 
 @dataclass(frozen=True)
 class Machine:
-    """Where torch runs: device, arithmetic ("bf16" or "fp32"), this process's place among the ranks
-    of torchrun.
-    """
+    """Where torch runs: device, arithmetic ("bf16" or "fp32"), and the rank under torchrun."""
 
     device: torch.device
     precision: str
@@ -59,24 +54,21 @@ class Machine:
         """
         gpu = torch.cuda.is_available()
         ranks = int(os.environ.get("WORLD_SIZE", "1"))
-        place = int(os.environ.get("LOCAL_RANK", "0"))
+        number = int(os.environ.get("LOCAL_RANK", "0"))
+        count = torch.cuda.device_count()
         if gpu and ranks == 1:
-            every = range(torch.cuda.device_count())
-            place = gpus.claimed(
-                tuple(str(torch.cuda.get_device_properties(number).uuid) for number in every)
-            )
-        elif gpu and place >= torch.cuda.device_count():
-            count = torch.cuda.device_count()
+            uuids = [str(torch.cuda.get_device_properties(each).uuid) for each in range(count)]
+            number = gpus.claimed(tuple(uuids))
+        elif gpu and number >= count:
             raise InputError(
-                f"training: process {place} of this machine finds {count} GPUs, expected no more "
+                f"training: process {number} of this machine finds {count} GPUs, expected no more "
                 "processes than GPUs"
             )
-        device = torch.device(f"cuda:{place}" if gpu else "cpu")
+        device = torch.device(f"cuda:{number}" if gpu else "cpu")
         if ranks > 1 and not distributed.is_initialized():
             distributed.init_process_group("nccl" if gpu else "gloo")
-        return cls(
-            device, arithmetic(precision, device.type), int(os.environ.get("RANK", "0")), ranks
-        )
+        rank = int(os.environ.get("RANK", "0"))
+        return cls(device, arithmetic(precision, device.type), rank, ranks)
 
     @property
     def gpu(self) -> bool:
@@ -84,9 +76,7 @@ class Machine:
         return self.device.type == "cuda"
 
     def placed(self, model: nn.Module) -> nn.Module:
-        """Return a model on the device for predictions; in fp32 on a processor in the form that it
-        computes fastest.
-        """
+        """Return a model on the device for predictions, in the form that is computed fastest."""
         if self.gpu or self.precision != "fp32":
             return model.to(self.device)
         return as_products(model).to(self.device, memory_format=torch.channels_last)
@@ -98,9 +88,9 @@ class Machine:
         return torch.autocast(self.device.type, torch.bfloat16)
 
     def with_shared_statistics(self, model: nn.Module) -> nn.Module:
-        """Return the model with every batch norm taking its statistics over all ranks, which torch
-        offers on GPUs.
+        """Return the model with every batch norm taking its statistics over all ranks.
 
+        torch offers this on GPUs.
         Raises: InputError for a batch norm that several ranks would train on processors.
         """
         if self.ranks == 1:
@@ -120,7 +110,9 @@ class Machine:
 
     def parallel(self, model: nn.Module) -> nn.Module:
         """Return the model, wrapped for gradient exchange where there are several ranks."""
-        return model if self.ranks == 1 else nn.parallel.DistributedDataParallel(model)
+        if self.ranks == 1:
+            return model
+        return nn.parallel.DistributedDataParallel(model)
 
     def agree(self, identity: str, steps: int) -> None:
         """Refuse ranks whose settings, samples or steps differ, since the result would not show it.
@@ -143,9 +135,9 @@ class Machine:
 
 
 def evaluation(block: dict) -> list:
-    """Return batch, threads, precision, mirror and workers (0 where left out) of the block
-    `recognition.evaluation`.
+    """Return batch, threads, precision, mirror and workers of the block `recognition.evaluation`.
 
+    workers is 0 where the block leaves it out.
     Raises: InputError naming a missing or unknown key.
     """
     return pick({"workers": 0} | block, "batch", "threads", "precision", "mirror", "workers")
@@ -175,12 +167,13 @@ def probabilities(
     read = ahead([numbers[start : start + batch] for start in mine])
     for start, inputs in zip(mine, read, strict=True):
         images = inputs.to(machine.device, non_blocking=True)
-        seen = (images, model.mirrored(images)) if mirror else (images,)
+        shown = [images]
+        if mirror:
+            shown.append(model.mirrored(images))
         with machine.autocast():
-            logits = [model(image) for image in seen]
-        result[start : start + batch] = (
-            torch.stack([value.double().softmax(1) for value in logits]).mean(0).cpu()
-        )
+            logits = [model(each) for each in shown]
+        shares = torch.stack([value.double().softmax(1) for value in logits])
+        result[start : start + batch] = shares.mean(0).cpu()
     if machine.ranks > 1:
         # Each entry is non-zero on one rank only, so the sum is exact.
         result = result.to(machine.device)

@@ -22,15 +22,15 @@ class Interval(NamedTuple):
 def bootstrap(
     clusters: np.ndarray, values: np.ndarray, generator: np.random.Generator, repeats: int = 4000
 ) -> Interval:
-    """Mean of `values` (samples,) with the percentile interval from resampling whole clusters
-    (samples,).
+    """Mean of `values` (samples,) with the percentile interval from resampling whole clusters.
 
+    clusters: (samples,).
     Source: Efron and Tibshirani, An Introduction to the Bootstrap, 1993, ch. 13; clusters as in the
     module's docstring.
     """
-    _, place = np.unique(clusters, return_inverse=True)
-    count = np.bincount(place).astype(float)
-    total = np.bincount(place, weights=values)
+    _, cluster = np.unique(clusters, return_inverse=True)
+    count = np.bincount(cluster).astype(float)
+    total = np.bincount(cluster, weights=values)
     means = np.empty(repeats)
     for repeat in range(repeats):
         chosen = generator.integers(0, len(count), len(count))
@@ -42,15 +42,15 @@ def bootstrap(
 def model_shares(
     motion: np.ndarray, correct: list[np.ndarray]
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return for each motion model its first sample (models,), its number of samples (models,) and
-    its share of correct samples by seed (seeds, models).
+    """Return the first sample, number of samples and share of correct ones of each motion model.
 
+    The first two are (models,); the share is (seeds, models).
     motion (samples,): name of the motion model; correct: (samples,) of every training seed.
     """
-    _, first, place, count = np.unique(
+    _, first, model, count = np.unique(
         motion, return_index=True, return_inverse=True, return_counts=True
     )
-    sums = np.array([np.bincount(place, weights=row) for row in correct])
+    sums = np.array([np.bincount(model, weights=row) for row in correct])
     return first, count, sums / count
 
 
@@ -67,8 +67,7 @@ def _seed_weights(seeds: int, repeats: int, generator: np.random.Generator) -> n
 
 
 def _stretch(count: int, freedom: int) -> float:
-    """Return the factor by which an interval of a mean from resampling `count` values is too
-    narrow.
+    """Return by what factor an interval from resampling `count` values is too narrow.
 
     Resampling n values gives (n - 1) / n of the variance of their mean. A spread that is estimated
     with `freedom` degrees of freedom needs Student's quantile instead of the normal one. Source:
@@ -85,18 +84,17 @@ def _stretch(count: int, freedom: int) -> float:
 def _subtype_weights(
     subtypes: np.ndarray, repeats: int, generator: np.random.Generator
 ) -> np.ndarray:
-    """Weight of each motion model, (repeats, models), when whole subtypes are drawn with all their
-    models.
+    """Weight of each motion model, (repeats, models), when whole subtypes are drawn.
 
     Models are not resampled within a drawn subtype, because the spread between subtypes includes
     theirs. Deviations are stretched for few subtypes, so a weight may be slightly negative. Source:
     Davison and Hinkley 1997, section 3.8.
     """
-    names, place = np.unique(subtypes, return_inverse=True)
+    names, subtype = np.unique(subtypes, return_inverse=True)
     if len(names) == 1:
         return np.ones((repeats, len(subtypes)))
     drawn = generator.multinomial(len(names), np.full(len(names), 1 / len(names)), repeats)
-    return (1 + (drawn - 1) * _stretch(len(names), len(names) - 1))[:, place]
+    return (1 + (drawn - 1) * _stretch(len(names), len(names) - 1))[:, subtype]
 
 
 def model_weights(
@@ -111,11 +109,11 @@ def model_weights(
         return generator.multinomial(
             len(subtypes), np.full(len(subtypes), 1 / len(subtypes)), repeats
         ).astype(float)
-    names, place = np.unique(subtypes, return_inverse=True)
+    names, subtype = np.unique(subtypes, return_inverse=True)
     drawn = generator.multinomial(len(names), np.full(len(names), 1 / len(names)), repeats)
     weights = np.zeros((repeats, len(subtypes)))
     for number in range(len(names)):
-        members = np.flatnonzero(place == number)
+        members = np.flatnonzero(subtype == number)
         # For a subtype drawn twice, its motion models are drawn twice, independently.
         weights[:, members] = generator.multinomial(
             drawn[:, number] * len(members), np.full(len(members), 1 / len(members))
@@ -132,8 +130,9 @@ def strict_difference(
     generator: np.random.Generator,
     repeats: int = 4000,
 ) -> Interval:
-    """Mean of first - second over seeds and samples; its 95 % interval resamples seeds, subtypes
-    and models.
+    """Mean of first - second over seeds and samples, with its 95 % interval.
+
+    The interval resamples seeds, subtypes and models.
 
     first, second (seeds, models): share of correct samples of each motion model, a row per training
     seed; the seeds of both are drawn independently, because equal seeds give two schemes different

@@ -1,5 +1,6 @@
-"""The card of a trained model, Markdown with the block of metadata that hubs read: written next to
-every model file.
+"""The card of a trained model: Markdown with the block of metadata that hubs read.
+
+It is written next to every model file.
 
 It holds the training's record, the run's table of accuracy, and how 8-bit weights change the
 answers.
@@ -60,9 +61,7 @@ RADAR_LIMITS = """\
 
 
 def accuracy_rows(model: str | Path, protocol: str, scheme: str) -> list[dict[str, str]]:
-    """Return the rows of the run's accuracy.csv for a model; none where it lies in no run with such
-    a table.
-    """
+    """Return the rows of the run's accuracy.csv for a model; none without such a table."""
     folder = run_folder(model)
     if folder is None or not (folder / "accuracy.csv").is_file():
         return []
@@ -88,7 +87,9 @@ def _table(header: tuple[str, ...], rows: list[tuple]) -> str:
 
 def _shown(value: object) -> str:
     """A value of a record as text of a card."""
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
+    if isinstance(value, float):
+        return f"{value:.4g}"
+    return str(value)
 
 
 def _accuracy(rows: list[dict[str, str]]) -> str:
@@ -96,93 +97,86 @@ def _accuracy(rows: list[dict[str, str]]) -> str:
     if not rows:
         return "The run had no table of accuracy when this card was written.\n"
     seeds = rows[0]["seeds"]
-    whose = (
-        "of this model"
-        if seeds == "1"
-        else f"mean over the {seeds} trainings of the run, of which this is one"
-    )
-    cells = [
-        (
-            "all" if row["snr_db"] == "avg" else row["snr_db"],
-            row["accuracy_percent"],
-            row["samples"],
-        )
-        for row in rows
-    ]
+    whose = f"mean over the {seeds} trainings of the run, of which this is one"
+    if seeds == "1":
+        whose = "of this model"
+    cells = []
+    for row in rows:
+        level = "all" if row["snr_db"] == "avg" else row["snr_db"]
+        cells.append((level, row["accuracy_percent"], row["samples"]))
     return (
         f"From the run's accuracy.csv: accuracy {whose}, with weights as trained, on the test fold "
-        "of the protocol, "
-        "evaluated as the run's\nconfiguration says (there, answers may be means over a sample and "
-        "its mirror image; "
-        "`lowalt predict` takes no such mean).\n\n"
+        "of the protocol, evaluated as the run's\nconfiguration says (there, answers may be means "
+        "over a sample and its mirror image; `lowalt predict` takes no such mean).\n\n"
         + _table(("SNR (dB)", "accuracy (%)", "test samples"), cells)
     )
 
 
 def _rounded(measured: dict) -> str:
     """The section on 8-bit weights."""
-    return f"""## Weights in 8 bits
-
-Matrices are whole numbers of 8 bits with one scale per row; everything else is float32. Both sets of weights answered
-all {measured["samples"]} samples of the validation fold, in float32:
-
-{
-        _table(
-            ("weights", "accuracy (%)"),
-            [
-                ("as trained", f"{measured['exact_percent']:.3f}"),
-                ("8 bits", f"{measured['percent']:.3f}"),
-            ],
-        )
-    }
-{measured["changed"]} answers differ; the largest change of a probability is {
-        measured["largest_change"]:.4f}.
-"""
+    accuracies = [
+        ("as trained", f"{measured['exact_percent']:.3f}"),
+        ("8 bits", f"{measured['percent']:.3f}"),
+    ]
+    return (
+        "## Weights in 8 bits\n\n"
+        "Matrices are whole numbers of 8 bits with one scale per row; everything else is float32. "
+        f"Both sets of weights answered\nall {measured['samples']} samples of the validation "
+        "fold, in float32:\n\n"
+        + _table(("weights", "accuracy (%)"), accuracies)
+        + f"\n{measured['changed']} answers differ; the largest change of a probability is "
+        f"{measured['largest_change']:.4f}.\n"
+    )
 
 
-def card(content: ModelFile, accuracy: list[dict[str, str]], name: str) -> str:
-    """Return the card of a model; accuracy: rows of the run's table (`accuracy_rows`); name: of the
-    model's file.
-    """
+def _facts(content: ModelFile) -> list[tuple[str, object]]:
+    """The rows of the section on training."""
     state = content.model
-    scheme = content.model["scheme"]
-    front = {
-        "license": "mit",
-        "library_name": "lowalt",
-        "tags": [*(tag for tag in TAGS if tag != "webdataset"), "safetensors"],
-    }
+    scheme = state["scheme"]
     method = scheme.get("method") or scheme.get("backbone") or state["network"].get("backbone", "")
     spectra = "+".join(SPECTRA[number] for number in scheme["spectra"])
+    sees = "the slow-time signals"
+    if spectra:
+        sees = f"{spectra}, {state['size']} x {state['size']} pixels each"
     facts = [
         ("classes", ", ".join(state["classes"])),
         ("scheme", scheme["name"]),
         ("protocol", state["protocol"]),
         ("network", f"{method}, fusion {scheme['fusion']}"),
-        (
-            "sees",
-            f"{spectra}, {state['size']} x {state['size']} pixels each"
-            if spectra
-            else "the slow-time signals",
-        ),
+        ("sees", sees),
         ("seed", state["seed"]),
-        *(
-            [("started from the weights of", state["start"]["training"])]
-            if "start" in state
-            else []
-        ),
-        *((words, _shown(content.run[key])) for key, words in RUN.items() if key in content.run),
-        *(
-            (f"SHA-256 of the {part} samples", f"`{digest}`")
-            for part, digest in sorted(content.identity.get("samples", {}).items())
-        ),
     ]
+    if "start" in state:
+        facts.append(("started from the weights of", state["start"]["training"]))
+    for key, words in RUN.items():
+        if key in content.run:
+            facts.append((words, _shown(content.run[key])))
+    for fold, digest in sorted(content.identity.get("samples", {}).items()):
+        facts.append((f"SHA-256 of the {fold} samples", f"`{digest}`"))
+    return facts
+
+
+def card(content: ModelFile, accuracy: list[dict[str, str]], name: str) -> str:
+    """Return the card of a model.
+
+    accuracy: rows of the run's table (`accuracy_rows`); name: of the model's file.
+    """
+    state = content.model
+    front = {
+        "license": "mit",
+        "library_name": "lowalt",
+        "tags": [*(tag for tag in TAGS if tag != "webdataset"), "safetensors"],
+    }
     if "radar" in content.input:
         radar = content.input["radar"]
         use = RADAR_USE
+        measured = "Not stated.\n"
+        if content.input.get("expected"):
+            measured = RADAR_ACCURACY.format(**content.input["expected"])
+        limits = RADAR_LIMITS
         caution = content.input.get("caution", "")
-        expected = content.input.get("expected")
-        measured = RADAR_ACCURACY.format(**expected) if expected else "Not stated.\n"
-        limits = RADAR_LIMITS + (f"- {caution[0].upper()}{caution[1:]}.\n" if caution else "")
+        if caution:
+            limits += f"- {caution[0].upper()}{caution[1:]}.\n"
         where = (
             f"a radar of {radar['carrier_hz'] / 1e9:g} GHz with a\n{radar['channel']} channel, "
             "trained on its twin"
@@ -192,21 +186,20 @@ def card(content: ModelFile, accuracy: list[dict[str, str]], name: str) -> str:
         measured = _accuracy(accuracy)
         use = USE
         limits = LIMITS
-    parts = [
+    sections = [
         f"---\n{yaml.safe_dump(front, sort_keys=False)}---\n\n# {name}\n",
         f"A network that tells {', '.join(state['classes'])} apart by their echoes at {where} by "
-        "lowalt "
-        f"{__version__}.\nProtocol {state['protocol']}: "
+        f"lowalt {__version__}.\nProtocol {state['protocol']}: "
         f"{MEANING.get(state['protocol'], 'of the user')}.\n",
         "## Training\n",
-        _table(("entry", "value"), facts),
+        _table(("entry", "value"), _facts(content)),
         "## Accuracy\n",
         measured,
-        _rounded(content.measured) if content.weights == EIGHT and content.measured else "",
-        f"## Use\n\n{use.format(name=name)}",
-        f"## Limits\n\n{limits}",
     ]
-    return "\n".join(part for part in parts if part)
+    if content.weights == EIGHT and content.measured:
+        sections.append(_rounded(content.measured))
+    sections += [f"## Use\n\n{use.format(name=name)}", f"## Limits\n\n{limits}"]
+    return "\n".join(sections)
 
 
 def write(out: str | Path, content: ModelFile, accuracy: list[dict[str, str]]) -> Path:

@@ -1,18 +1,16 @@
-"""A trained model as one safetensors file, which any program reads without running code: weights,
-and all known of it.
+"""A trained model as one safetensors file, which any program reads without running code.
 
 The file's metadata has one entry, `lowalt`, a JSON object (the library writes several entries in
 random order):
-    identity    all that determined the weights, as in the training's checkpoint: settings, scheme,
-    protocol, SHA-256 of
-                the samples, version of torch; trained_on, the [subtype, fold, motion models] of
-                those that trained
+    identity    all that determined the weights, as in the training's checkpoint: settings,
+                scheme, protocol, SHA-256 of the samples, version of torch; trained_on, the
+                [subtype, fold, motion models] of those that trained
     model       scheme, protocol, network, size, seed, colour_map, classes; start, where it had one
     run         content of the training's run.json; {} where there was none
     input       network, spectra and images of the run's configuration; {} where there was none
     weights     "as trained", or "8 bits": each row of a matrix as whole numbers -127..127 and one
-    scale (float32), a
-                quarter of the bytes; biases, norms, running means and colours stay as they are
+                scale (float32), a quarter of the bytes; biases, norms, running means and colours
+                stay as they are
     measured    of 8-bit weights: how they change the answers (`zoo`)
     digest      SHA-256 of everything above and of every tensor
 Source of 8 bits: Krishnamoorthi, Quantizing deep convolutional networks, arXiv:1806.08342, 2018,
@@ -68,25 +66,28 @@ def run_folder(model: str | Path) -> Path | None:
     # RUN/models/PROTOCOL/SCHEME/SEED/
     scheme_folder = Path(model).resolve().parent.parent
     models = scheme_folder.parent.parent
-    return models.parent if models.name == "models" else None
+    if models.name != "models":
+        return None
+    return models.parent
 
 
 def of_run(path: str | Path) -> ModelFile:
-    """Return the content of a training's model.safetensors, with the records next to it and above
-    it.
+    """Return the content of a training's model.safetensors, with the records next to it and above.
 
     Raises: InputError where the model is missing or damaged.
     """
     content = read(path)
+    run: dict = {}
     record = Path(path).with_name("run.json")
+    if record.is_file():
+        run = read_object(record, "a run record")
+    blocks: dict = {}
     folder = run_folder(path)
-    config = (
-        load_yaml(folder / "config.yaml") if folder and (folder / "config.yaml").is_file() else {}
-    )
-    kept = read_object(record, "a run record") if record.is_file() else {}
-    return replace(
-        content, run=kept, input={name: config[name] for name in INPUT} if config else {}
-    )
+    if folder and (folder / "config.yaml").is_file():
+        config = load_yaml(folder / "config.yaml")
+        if config:
+            blocks = {name: config[name] for name in INPUT}
+    return replace(content, run=run, input=blocks)
 
 
 def _digest(tensors: dict[str, torch.Tensor], about: dict) -> str:
@@ -148,8 +149,10 @@ def weights_of(content: ModelFile, path: str | Path) -> dict[str, torch.Tensor]:
 
     Raises: InputError where 8-bit weights and scales do not fit together.
     """
+    if content.weights != EIGHT:
+        return content.tensors
     try:
-        return restored(content.tensors) if content.weights == EIGHT else content.tensors
+        return restored(content.tensors)
     except (KeyError, TypeError, IndexError, RuntimeError) as error:
         raise InputError(f"{path}: not a trained model ({in_one_line(error)})") from error
 
@@ -157,8 +160,7 @@ def weights_of(content: ModelFile, path: str | Path) -> dict[str, torch.Tensor]:
 def rounded(
     weights: Mapping[str, torch.Tensor], matrices: Collection[str]
 ) -> dict[str, torch.Tensor]:
-    """Return weights by name, those named in `matrices` as int8 of the same shape, their scales
-    with them.
+    """Return weights by name, those named in `matrices` as int8 of the same shape, with scales.
 
     weights: float32 (rows, ...) where they are to be rounded.
     """

@@ -7,9 +7,9 @@ from lowalt.files.errors import InputError
 
 
 def path_of(model: str | Path) -> Path:
-    """Return the file of a model: a path, with or without .safetensors, or that of a name which a
-    collection has.
+    """Return the file of a model by its path or by a name that a collection has.
 
+    The path may leave out .safetensors.
     Raises: InputError naming the models there are.
     """
     path = Path(model)

@@ -1,6 +1,4 @@
-"""The loss of a training batch: all stations together and, by a weight, each station alone; and its
-gradient.
-"""
+"""The loss of a training batch, of all stations together and of each alone, and its gradient."""
 
 import contextlib
 
@@ -13,11 +11,10 @@ from lowalt.recognition.inference import Machine
 def objective(
     model: nn.Module, images: torch.Tensor, labels: torch.Tensor, block: dict, machine: Machine
 ) -> torch.Tensor:
-    """Return the loss of a batch: cross entropy of all views together and, by `alone`, of each
-    station alone.
+    """Return the loss of a batch: cross entropy of all views and, by `alone`, of each station.
 
-    images (B, K * V, S, S) uint8, labels (B,); block: the training settings. The two parts are
-    averaged by weight.
+    images (B, K * V, S, S) uint8, labels (B,); block: the training settings. The two entropies
+    are averaged by weight.
     """
     criterion = nn.CrossEntropyLoss(label_smoothing=block["label_smoothing"])
     stations = images.shape[1] // unwrapped(model).shape[1]
@@ -34,27 +31,23 @@ def objective(
 def descent(
     model: nn.Module, images: torch.Tensor, labels: torch.Tensor, block: dict, machine: Machine
 ) -> torch.Tensor:
-    """Add the gradient of a batch's loss to the weights' gradients, and return the loss, which has
-    none itself.
+    """Add the gradient of a batch's loss to the weights' gradients, and return the loss.
 
-    images, labels, block: as `objective`. The batch goes through the network in `accumulate` parts,
-    each weighted by its share of the samples, so the gradient is that of the whole batch except for
-    rounding and batch norms. The ranks exchange gradients once, with the last part.
+    images, labels, block: as `objective`. The batch goes through the network in `accumulate`
+    chunks, each weighted by its share of the samples, so the gradient is that of the whole batch
+    except for rounding and batch norms. The ranks exchange gradients once, with the last chunk.
     """
-    parts = list(
-        zip(images.chunk(block["accumulate"]), labels.chunk(block["accumulate"]), strict=True)
-    )
+    image_chunks = images.chunk(block["accumulate"])
+    label_chunks = labels.chunk(block["accumulate"])
     total = torch.zeros((), device=machine.device)
-    for number, (part, part_labels) in enumerate(parts, start=1):
-        alone = (
-            contextlib.nullcontext()
-            if machine.ranks == 1 or number == len(parts)
-            else model.no_sync()
-        )
-        with alone:
-            loss = objective(model, part, part_labels, block, machine) * (
-                len(part_labels) / len(labels)
-            )
+    for number, chunk in enumerate(zip(image_chunks, label_chunks, strict=True), start=1):
+        chunk_images, chunk_labels = chunk
+        exchange: contextlib.AbstractContextManager = contextlib.nullcontext()
+        if machine.ranks > 1 and number < len(image_chunks):
+            exchange = model.no_sync()
+        with exchange:
+            share = len(chunk_labels) / len(labels)
+            loss = objective(model, chunk_images, chunk_labels, block, machine) * share
             loss.backward()
         total += loss.detach()
     return total

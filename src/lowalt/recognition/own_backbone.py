@@ -1,5 +1,4 @@
-"""A backbone of the user's own: a function of a Python file, which the configuration names as
-FILE.py:FUNCTION.
+"""A backbone of the user's own: a function of a Python file, named as FILE.py:FUNCTION.
 
 The function takes the pixels per side of an image and returns a torch module, RGB images (B, 3,
 size, size) float32 to features (B, features). The file runs with the rights of the user, so it is
@@ -36,6 +35,8 @@ def backbone(name: str, size: int) -> nn.Module:
         )
     _, _, function = name.rpartition(":")
     specification = importlib.util.spec_from_file_location(f"lowalt_own_{path.stem}", path)
+    if specification is None or specification.loader is None:
+        raise InputError(f"network: backbone {name!r}: {path} is no Python file")
     module = importlib.util.module_from_spec(specification)
     sys.modules[specification.name] = module
     try:
@@ -50,12 +51,11 @@ def backbone(name: str, size: int) -> nn.Module:
     except Exception as error:
         raise InputError(f"network: backbone {name!r}: {type(error).__name__}: {error}") from error
     if not isinstance(features, torch.Tensor) or features.ndim != 2 or len(features) != 2:
+        given: object = type(features).__name__
         if isinstance(features, torch.Tensor):
-            shape = tuple(features.shape)
-        else:
-            shape = type(features).__name__
+            given = tuple(features.shape)
         raise InputError(
-            f"network: backbone {name!r} gives {shape} for two images, expected (2, features)"
+            f"network: backbone {name!r} gives {given} for two images, expected (2, features)"
         )
     network.num_features = features.shape[1]
     if not hasattr(network, "pretrained_cfg"):

@@ -48,17 +48,23 @@ def verdict(low: float, high: float, seeds: int) -> str:
         return "not ranked"
     if low > 0:
         return "holds"
-    return "reversed" if high < 0 else "undecided"
+    if high < 0:
+        return "reversed"
+    return "undecided"
 
 
 def ordering_rows(compared: list[list], published: dict[tuple[str, str], float]) -> Iterable[list]:
-    """Yield rows [protocol, scheme, over, claim, paper_points, seeds, difference_points, low, high,
-    ordering].
+    """Yield the rows of orderings.csv.
 
+    Columns: protocol, scheme, over, claim, paper_points, seeds, difference_points, low, high,
+    ordering.
     compared: the rows of comparisons.csv.
     """
     for protocol, better, other, claim, _, seeds, difference, low, high in compared:
-        theirs = [published.get((protocol, name)) for name in (better, other)]
-        paper = "" if None in theirs else f"{theirs[0] - theirs[1]:.2f}"
+        percent = published.get((protocol, better))
+        percent_of_other = published.get((protocol, other))
+        paper = ""
+        if percent is not None and percent_of_other is not None:
+            paper = f"{percent - percent_of_other:.2f}"
         ordering = verdict(float(low), float(high), seeds)
         yield [protocol, better, other, claim, paper, seeds, difference, low, high, ordering]

@@ -39,8 +39,9 @@ def _named(path: Path, call: Callable[..., Any], *arguments: object) -> Any:
 
 
 def _signals(path: Path) -> np.ndarray:
-    """Return the complex array of a signal file. Raises: InputError naming the file, for another
-    kind of file.
+    """Return the complex array of a signal file.
+
+    Raises: InputError naming the file, for another kind of file.
     """
     if path.suffix != ".npy":
         raise InputError(f"{path}: expected signals (.npy) or a tile (.png)")
@@ -68,16 +69,16 @@ def predict(trained: Trained, path: Path, settings: dict) -> dict[str, float]:
 
 
 def answer(trained: Trained, images: np.ndarray, settings: dict, where: str) -> dict[str, float]:
-    """Return the probability of each category for all index images (stations spectra, S, S) uint8
-    of one sample.
+    """Return the probability of each category for all images of one sample.
 
+    images: index images (stations spectra, S, S) uint8.
     settings: {network, spectra, images}; where: what the images are of, for refusals.
     Raises: InputError naming `where`, for images that the model does not see, or an answer that is
     not finite.
     """
     names = named(settings["spectra"])
-    places = columns_in(trained.scheme.columns, names, len(images) // len(names), where)
-    views = torch.from_numpy(resize(images, trained.size)[places][None])
+    columns = columns_in(trained.scheme.columns, names, len(images) // len(names), where)
+    views = torch.from_numpy(resize(images, trained.size)[columns][None])
     with torch.inference_mode():
         shares = trained.model(views).double().softmax(1)[0]
     if not torch.isfinite(shares).all():

@@ -1,5 +1,4 @@
-"""The prediction file: class probabilities of every sample, in a format that any other program can
-write.
+"""The prediction file: class probabilities of every sample, as any other program can write it.
 
 A CSV table, one row per sample, in any order. The command `score` needs only `key` and the
 probabilities and takes the rest from the data set. Probabilities are not negative and sum to one
@@ -7,11 +6,12 @@ within 1e-3.
 
     key            the sample's key in the shards
     subtype, group, fold, model, snr_db, label    as in the sample's record ("inf" for no noise)
-    range_m        distance of the nearest station the model used, aspect_deg the aspect seen from
-    it; may be empty p_uav, p_bird, p_vehicle, p_pedestrian        class probabilities, by the names
-    and in the order of the classes part           of the training's protocol: "test" (its accuracy
-    counts), "validation" or, in the unseen protocol,
-                   "seen_test"; optional
+    range_m        distance of the nearest station that the model used; may be empty
+    aspect_deg     the aspect seen from that station; may be empty
+    p_uav, p_bird, p_vehicle, p_pedestrian
+                   class probabilities, by the names and in the order of the classes
+    part           of the training's protocol: "test" (its accuracy counts), "validation" or, in
+                   the unseen protocol, "seen_test"; optional
 """
 
 import csv
@@ -27,7 +27,7 @@ from lowalt.files.csv_tables import write_csv
 from lowalt.files.errors import InputError
 from lowalt.files.json_objects import read_object
 from lowalt.recognition.protocols import FOLDS
-from lowalt.recognition.samples import Facts
+from lowalt.recognition.samples import Facts, motion_names
 
 COLUMNS = ("key", "subtype", "group", "fold", "model", "snr_db", "label", "range_m", "aspect_deg")
 """Columns before the class probabilities."""
@@ -69,10 +69,14 @@ class Predictions:
     range_m: np.ndarray
     aspect_deg: np.ndarray
     probabilities: np.ndarray
-    motion = Facts.motion
 
     def __len__(self) -> int:
         return len(self.key)
+
+    @property
+    def motion(self) -> np.ndarray:
+        """Name of each sample's motion model, (samples,) text."""
+        return motion_names(self.subtype, self.model)
 
     @property
     def guesses(self) -> np.ndarray:
@@ -89,12 +93,9 @@ class Predictions:
         return Predictions(**{name: value[numbers] for name, value in vars(self).items()})
 
     def of(self, pairs: set[tuple[str, str]]) -> "Predictions":
-        """Return the rows whose (group, fold) is among `pairs`, sorted by key so that schemes
-        align.
-        """
-        inside = [
-            pair in pairs for pair in zip(self.group.tolist(), self.fold.tolist(), strict=True)
-        ]
+        """Return the rows whose (group, fold) is among `pairs`, by key so that schemes align."""
+        own_pairs = zip(self.group.tolist(), self.fold.tolist(), strict=True)
+        inside = [pair in pairs for pair in own_pairs]
         rows = np.flatnonzero(inside)
         return self.take(rows[np.argsort(self.key[rows], kind="stable")])
 
@@ -109,25 +110,33 @@ def record(path: str | Path) -> dict:
 
 
 def from_facts(facts: Facts, stations: tuple[int, ...], probabilities: np.ndarray) -> Predictions:
-    """Return predictions for samples with these facts; range and aspect are the nearest of
-    `stations`.
+    """Return predictions for samples with these facts.
+
+    Range and aspect are those of the nearest of `stations`.
     """
     ranges = facts.range_m[:, list(stations)]
     nearest = np.where(np.isnan(ranges), math.inf, ranges).argmin(1)
     rows = np.arange(len(facts))
     aspects = np.degrees(facts.aspect_rad[:, list(stations)][rows, nearest])
-    same = {
-        name: getattr(facts, name)
-        for name in ("key", "subtype", "group", "fold", "model", "snr_db", "label")
-    }
     return Predictions(
-        **same, range_m=ranges[rows, nearest], aspect_deg=aspects, probabilities=probabilities
+        key=facts.key,
+        subtype=facts.subtype,
+        group=facts.group,
+        fold=facts.fold,
+        model=facts.model,
+        snr_db=facts.snr_db,
+        label=facts.label,
+        range_m=ranges[rows, nearest],
+        aspect_deg=aspects,
+        probabilities=probabilities,
     )
 
 
 def _number(value: float) -> str:
     """A number as a cell of the file; NaN as an empty one."""
-    return "" if math.isnan(value) else repr(float(value))
+    if math.isnan(value):
+        return ""
+    return repr(float(value))
 
 
 def write(

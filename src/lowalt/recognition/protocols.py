@@ -17,9 +17,9 @@ FOLDS = {"seen": _SEEN_FOLDS, "unseen": _UNSEEN_FOLDS}
 
 
 def folds(protocol: str, part: str) -> set[tuple[str, str]]:
-    """Return the (group, fold) pairs of a protocol's part: "train", "validation", "test" or
-    ("unseen") "seen_test".
+    """Return the (group, fold) pairs of a protocol's part.
 
+    part: "train", "validation", "test" or, of the protocol unseen, "seen_test".
     Raises: InputError for an unknown protocol or part. Source: paper, section V-A.
     """
     try:
@@ -31,8 +31,9 @@ def folds(protocol: str, part: str) -> set[tuple[str, str]]:
 
 
 def evaluated_folds(protocol: str) -> set[tuple[str, str]]:
-    """Return the (group, fold) pairs of all parts of a protocol but its training part. Raises: as
-    `folds`.
+    """Return the (group, fold) pairs of all parts of a protocol but its training part.
+
+    Raises: as `folds`.
     """
     return set().union(
         *(folds(protocol, part) for part in FOLDS.get(protocol, ("test",)) if part != "train")

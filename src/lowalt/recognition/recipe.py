@@ -34,20 +34,24 @@ def check(block: dict) -> dict:
 
 
 def schedule(share: float, warmup: float) -> float:
-    """Factor on the learning rate after `share` (0..1) of all steps: linear up to `warmup`, then a
-    cosine to 0.
+    """Factor on the learning rate after `share` (0..1) of all steps.
+
+    It rises linearly up to `warmup`, then falls as a cosine to 0.
 
     >>> [round(schedule(share, 0.1), 3) for share in (0.05, 0.1, 0.55, 1.0)]
     [0.5, 1.0, 0.5, 0.0]
     """
     if share < warmup:
         return share / warmup
-    return 0.5 * (1 + math.cos(math.pi * (share - warmup) / (1 - warmup))) if warmup < 1 else 1.0
+    if warmup >= 1:
+        return 1.0
+    return 0.5 * (1 + math.cos(math.pi * (share - warmup) / (1 - warmup)))
 
 
 def averaging(decay: float, step: int) -> float:
-    """Weight of the old average after `step` (1, 2, ...) so that the average is sum d^k w_k / sum
-    d^k over all ages k.
+    """Weight of the old average after `step` (1, 2, ...).
+
+    The average is then sum d^k w_k / sum d^k over all ages k.
 
     A constant weight d would keep the first, random weights in the average for 1 / (1 - d) steps.
     Source: the bias correction of Kingma and Ba, Adam, 2015, section 3.
@@ -55,32 +59,28 @@ def averaging(decay: float, step: int) -> float:
         >>> [round(averaging(0.5, step), 3) for step in (1, 2, 9)]
         [0.0, 0.333, 0.499]
     """
-    return 1 - (1 - decay) / (1 - decay**step) if decay < 1 else 1 - 1 / step
+    if decay < 1:
+        return 1 - (1 - decay) / (1 - decay**step)
+    return 1 - 1 / step
 
 
 def optimiser(model: nn.Module, block: dict) -> torch.optim.AdamW:
     """Return AdamW with four groups: backbone or not, matrix (decayed) or not."""
     groups = []
-    named = list(model.named_parameters())
-    for of_backbone in (True, False):
-        for matrix in (True, False):
-            members = [
-                value
-                for name, value in named
-                if name.startswith("backbone.") == of_backbone
-                and (value.ndim > 1 and "modality" not in name) == matrix
-            ]
-            factor = block["backbone_rate"] if of_backbone else 1.0
-            decay = block["weight_decay"] if matrix else 0.0
+    for of_backbone, factor in ((True, block["backbone_rate"]), (False, 1.0)):
+        for matrix, decay in ((True, block["weight_decay"]), (False, 0.0)):
+            members = []
+            for name, value in model.named_parameters():
+                is_matrix = value.ndim > 1 and "modality" not in name
+                if name.startswith("backbone.") == of_backbone and is_matrix == matrix:
+                    members.append(value)
             if members:
                 groups.append({"params": members, "factor": factor, "weight_decay": decay})
     return torch.optim.AdamW(groups, lr=block["rate"], fused=True)
 
 
 def seeded(seed: int, keys: tuple, threads: int) -> None:
-    """Fix everything torch draws from or sums with: seed of the run, thread count, deterministic
-    algorithms.
-    """
+    """Fix what torch draws from and sums with: seed, thread count, deterministic algorithms."""
     torch.manual_seed(int.from_bytes(digest(seed, "recognition-torch", *keys)[:8], "little") >> 1)
     torch.set_num_threads(threads)
     os.environ.setdefault("CUBLAS_WORKSPACE_CONFIG", ":4096:8")
@@ -91,13 +91,15 @@ def seeded(seed: int, keys: tuple, threads: int) -> None:
 
 
 def random_state(device: torch.device) -> dict[str, torch.Tensor]:
-    """Return the states of the generators that a training on `device` draws from: the processor's,
-    and a GPU's own.
+    """Return the states of the generators that a training on `device` draws from.
 
+    They are the processor's and, on a GPU, that GPU's own.
     All ranks draw the same numbers, so one rank's states serve all.
     """
     states = {"cpu": torch.get_rng_state()}
-    return {**states, "cuda": torch.cuda.get_rng_state(device)} if device.type == "cuda" else states
+    if device.type == "cuda":
+        states["cuda"] = torch.cuda.get_rng_state(device)
+    return states
 
 
 def set_random_state(device: torch.device, states: dict[str, torch.Tensor]) -> None:

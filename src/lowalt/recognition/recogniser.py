@@ -1,5 +1,4 @@
-"""The fusion network of the paper on any timm backbone: images of several stations and spectra to
-classes.
+"""The paper's fusion network on any timm backbone: images of stations and spectra to classes.
 
 Axes of every tensor: B samples, K stations, V spectra of a station, then channels, rows, columns.
 The same code serves any subset of stations and spectra; a view is a (station, spectrum) pair,
@@ -36,9 +35,9 @@ KEYS = (
 
 
 def backbone(name: str, weights: str, size: int) -> nn.Module:
-    """Return the timm model `name`, or the user's own FILE.py:FUNCTION, as a feature extractor for
-    size x size RGB images.
+    """Return a feature extractor for size x size RGB images.
 
+    name: of a timm model, or the user's own FILE.py:FUNCTION.
     weights: "none", "hub" or a local file. Models with a fixed input size are built for `size`
     where timm can.
     Raises: InputError for an unknown name, a missing file, or weights that do not fit.
@@ -61,7 +60,8 @@ def backbone(name: str, weights: str, size: int) -> nn.Module:
             )
         options["pretrained_cfg_overlay"] = {"file": weights}
     options["pretrained"] = weights != "none"
-    for extra in ({"img_size": size}, {}):
+    extras: tuple[dict, ...] = ({"img_size": size}, {})
+    for extra in extras:
         try:
             return timm.create_model(name, **options, **extra)
         except TypeError:
@@ -75,8 +75,7 @@ def backbone(name: str, weights: str, size: int) -> nn.Module:
 
 
 class Palettes(nn.Module):
-    """Turns index images into normalised RGB by one table per spectrum, so that colours are never
-    stored.
+    """Turns index images into normalised RGB by a table per spectrum; colours are never stored.
 
     table (spectra, 256, 3) float32: (colour - mean) / deviation, colours in 0..1, both of the
     backbone's channels.
@@ -100,8 +99,9 @@ class Palettes(nn.Module):
         )
 
     def forward(self, index: torch.Tensor) -> torch.Tensor:
-        """Index images (B, K, V, rows, columns) uint8 -> (B, K, V, 3, rows, columns) float,
-        channels last.
+        """Index images (B, K, V, rows, columns) uint8 -> (B, K, V, 3, rows, columns) float.
+
+        Channels are last in memory.
         """
         shifted = index.int() + self.offset[:, None, None]
         colour = nn.functional.embedding(shifted, self.table.flatten(0, 1))
@@ -109,16 +109,15 @@ class Palettes(nn.Module):
 
 
 class Recogniser(Fused):
-    """Index images of a scheme's views to a logit for each class: palettes, shared backbone,
-    fusion, classifier.
-    """
+    """Index images of a scheme's views to logits: palettes, shared backbone, fusion, classifier."""
 
     def __init__(
         self, scheme: Scheme, block: dict, size: int, palettes: np.ndarray, classes: int
     ) -> None:
-        """scheme: views and fusion; block: `recognition.network`; size: pixels; palettes (3, 256,
-        3) uint8; classes: their number.
+        """Build the network of a scheme.
 
+        scheme: views and fusion; block: `recognition.network`; size: pixels; palettes (3, 256, 3)
+        uint8; classes: their number.
         Raises: InputError for an unknown or missing key, a backbone timm does not have, or heads
         that do not fit.
         """
@@ -146,9 +145,7 @@ class Recogniser(Fused):
 
     @staticmethod
     def mirrored(index: torch.Tensor) -> torch.Tensor:
-        """Return index images (..., rows, columns) turned around along Doppler: the target turned
-        by 180 degrees.
-        """
+        """Return index images (..., rows, columns) mirrored along Doppler: the target reversed."""
         return index.flip(-2)
 
 
@@ -163,8 +160,7 @@ def built(scheme: Scheme, block: dict, size: int, colours: str, classes: int) ->
 
 
 def checkpoint_activations(model: Recogniser) -> None:
-    """Let the backbone keep few activations and compute the others again for the gradient, which
-    stays the same.
+    """Let the backbone keep few activations and compute the others again for the same gradient.
 
     Raises: InputError for a backbone that cannot, or that has batch norms, whose running means a
     second pass would move a second time. Source: Chen et al., Training Deep Nets with Sublinear

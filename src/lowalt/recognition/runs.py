@@ -50,8 +50,9 @@ def train(
     events: bool = False,
     build: Build = built,
 ) -> None:
-    """Train a scheme, from its checkpoint if there is one; write `model.safetensors`, `history.csv`
-    and `run.json`.
+    """Train a scheme, from its checkpoint if there is one, and write its files.
+
+    They are `model.safetensors`, `history.csv` and `run.json`.
 
     samples: the sources "train", of which the scheme's share is kept, and "validation"; settings:
     {seed, size, colour_map, network, training, augmentation, classes}, the classes by label;
@@ -134,7 +135,10 @@ def _identity(
     samples: dict, scheme: Scheme, protocol: str, settings: dict, machine: Machine
 ) -> str:
     """Return the JSON text of all that determines a training's weights."""
+    own_code = {}
     code = file_of(scheme.backbone_of(settings["network"]))
+    if code and code.is_file():
+        own_code["own"] = sha256(code)
     # Leave out settings that change no weight, and name the precision that this machine computes
     # with.
     replaced = {"checkpoint_s": None, "workers": None, "precision": machine.precision}
@@ -145,7 +149,7 @@ def _identity(
         samples={part: source.sha256() for part, source in samples.items()},
         torch=torch.__version__,
         trained_on=statement(samples["train"].facts),
-        **({"own": sha256(code)} if code and code.is_file() else {}),
+        **own_code,
     )
 
 
@@ -176,8 +180,9 @@ def load(path: str | Path, trusted: str = "", build: Build = built) -> Trained:
 
 
 def opened(model: str | Path, trusted: str = "") -> tuple["Trained", dict]:
-    """Return a trained model and how its images are made of signals ({network, spectra, images}; {}
-    where unknown).
+    """Return a trained model and how its images are made of signals.
+
+    The latter is {network, spectra, images}, {} where it is unknown.
 
     model: a model file (.safetensors) of a training or another, or a name that
     `named_models.path_of` knows; trusted: the user's FILE.py:FUNCTION for a model whose backbone is
@@ -192,9 +197,9 @@ def opened(model: str | Path, trusted: str = "") -> tuple["Trained", dict]:
 def of_file(
     content: ModelFile, path: str | Path, trusted: str = "", build: Build = built
 ) -> Trained:
-    """Return the model of a file's content, ready to answer; path: where it came from; the rest as
-    in `of_state`.
+    """Return the model of a file's content, ready to answer.
 
+    path: where it came from; the rest as in `of_state`.
     Raises: InputError where weights and settings do not fit together.
     """
     return of_state(
@@ -203,9 +208,9 @@ def of_file(
 
 
 def of_state(state: dict, path: str | Path, trusted: str = "", build: Build = built) -> Trained:
-    """Return the trained model of what a model file keeps: `weights` and the checked settings of
-    its network.
+    """Return the trained model that a model file keeps.
 
+    state: `weights` and the checked settings of its network;
     path: its file; trusted: the user's FILE.py:FUNCTION for a model whose backbone is such code;
     build: makes its network.
     Raises: InputError where weights and settings do not fit together, or the backbone is code that
@@ -218,7 +223,10 @@ def of_state(state: dict, path: str | Path, trusted: str = "", build: Build = bu
         refuse_unfinite(weights, path)
         model = _network(scheme, state, len(classes), path, trusted, build)
     except InputError as error:
-        raise InputError(str(error) if str(path) in str(error) else f"{path}: {error}") from error
+        message = str(error)
+        if str(path) not in message:
+            message = f"{path}: {message}"
+        raise InputError(message) from error
     except Exception as error:
         # For settings that do not fit together, torch and timm raise almost any exception.
         raise InputError(f"{path}: not a trained model ({in_one_line(error)})") from error
@@ -257,9 +265,7 @@ def _network(
 
 
 def answers(trained: Trained, samples: Samples, settings: dict, machine: Machine) -> np.ndarray:
-    """Return the class probabilities (n, classes) of all samples of a source; settings as in
-    `evaluate`.
-    """
+    """Return the class probabilities (n, classes) of all samples; settings as in `evaluate`."""
     batch, threads, _, mirror, workers = inference.evaluation(settings)
     recipe.seeded(trained.seed, ("evaluate",), threads)
     ahead = Prefetch(Unchanged(samples), workers, pin=machine.gpu)
@@ -277,8 +283,7 @@ def evaluate(
     trained_on: str = "",
     more: dict | None = None,
 ) -> None:
-    """Write the predictions for all samples of a source, and the run's record (.json) in the same
-    folder.
+    """Write the predictions for all samples of a source, with the run's record (.json) beside them.
 
     settings: {batch, threads, precision, mirror}, perhaps with workers, the processes that read
     samples; trained_on: the run that trained the model, where it is another; more: further entries

@@ -1,8 +1,6 @@
-"""The source of samples that training and evaluation use: caches of views, shards, or simulation on
-access.
-"""
+"""Where training and evaluation read samples: caches of views, shards, or simulation on access."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,22 +14,19 @@ from lowalt.shards import ShardSet
 
 @dataclass(frozen=True)
 class Source:
-    """Exactly one of three sources: caches of views, the index of shards, or a function that
-    simulates samples.
+    """One of three sources: caches of views, the index of shards, or a function that simulates.
 
     made: the function, with the arguments of `samples`. The caller imports it, so that reading
     stored samples does not import the simulation.
     """
 
-    views: list[str | Path] | None = None
+    views: Sequence[str | Path] | None = None
     index: str | Path | None = None
     made: Callable[..., Samples] | None = None
 
     @classmethod
     def of_run(cls, index: Path, size: int) -> "Source":
-        """Return a run's caches of views of this size if every shard has one, else its shards
-        (index).
-        """
+        """Return a run's caches of views of this size if every shard has one, else its index."""
         caches = sorted(index.parents[1].glob(f"views/{size}/*.npz"))
         shards = {Path(shard["name"]).stem for shard in ShardSet(index).index["shards"]}
         return cls(views=caches) if {path.stem for path in caches} == shards else cls(index=index)
@@ -47,9 +42,9 @@ class Source:
         """
         if self.made is not None:
             return self.made(columns, pairs, size, placed)
-        if self.views is None:
+        if self.index is not None:
             return ShardSamples(self.index, columns, pairs, size, placed)
-        cached = ViewSamples(self.views, columns, pairs)
+        cached = ViewSamples(self.views or (), columns, pairs)
         if cached.size != size:
             raise InputError(f"--views: images of {cached.size} pixels, expected {size}")
         return cached

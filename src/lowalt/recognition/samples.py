@@ -27,6 +27,11 @@ from lowalt.recognition.schemes import columns_in
 from lowalt.spectra.catalogue import LISTED
 
 
+def motion_names(subtype: np.ndarray, model: np.ndarray) -> np.ndarray:
+    """Return the name of each sample's motion model, (samples,) text."""
+    return np.char.add(np.char.add(subtype, "/"), model.astype(str))
+
+
 @dataclass(frozen=True)
 class Facts:
     """Metadata of samples, one entry each; range_m and aspect_rad have a column per station."""
@@ -47,7 +52,7 @@ class Facts:
     @property
     def motion(self) -> np.ndarray:
         """Name of each sample's motion model, (samples,) text."""
-        return np.char.add(np.char.add(self.subtype, "/"), self.model.astype(str))
+        return motion_names(self.subtype, self.model)
 
     def take(self, numbers: np.ndarray) -> "Facts":
         """Return the facts of the samples `numbers` (indices or a mask)."""
@@ -85,9 +90,7 @@ def first_models(facts: Facts, share: float) -> np.ndarray:
 
 
 def statement(facts: Facts) -> list[list]:
-    """Return what a trained model states of its samples: [subtype, fold, number of motion models],
-    sorted.
-    """
+    """Return what a model states of its samples: [subtype, fold, number of models], sorted."""
     motion = facts.motion
     found = []
     for subtype in np.unique(facts.subtype).tolist():
@@ -99,9 +102,7 @@ def statement(facts: Facts) -> list[list]:
 
 
 def fingerprint(facts: Facts, *content: bytes | memoryview) -> str:
-    """Return the SHA-256 of keys, labels, subtypes, models and SNRs of some samples, and of
-    `content`.
-    """
+    """Return the SHA-256 of samples' keys, labels, subtypes, models and SNRs, and of `content`."""
     hasher = hashlib.sha256()
     for name in ("key", "label", "subtype", "model", "snr_db"):
         values = np.ascontiguousarray(getattr(facts, name))
@@ -113,8 +114,7 @@ def fingerprint(facts: Facts, *content: bytes | memoryview) -> str:
 
 
 class Samples:
-    """A source of samples: `facts` of each, `size` of its images, `views` of some, and `sha256` of
-    all.
+    """A source of samples: their `facts`, `size` of images, `views` and the `sha256` of all.
 
     A training calls `changed`, an evaluation `inputs`. A source whose network takes more than
     images overrides both.
@@ -122,6 +122,10 @@ class Samples:
 
     facts: Facts
     size: int
+
+    def keep(self, numbers: np.ndarray) -> None:
+        """Drop all samples but those at `numbers`."""
+        raise NotImplementedError
 
     def views(self, numbers: np.ndarray) -> np.ndarray:
         """Index images (len(numbers), columns, size, size) uint8 of the samples `numbers`."""
@@ -132,9 +136,7 @@ class Samples:
         raise NotImplementedError
 
     def inputs(self, numbers: np.ndarray) -> Any:
-        """Return what the network takes of the samples `numbers`: an array, or several in a named
-        tuple.
-        """
+        """Return what the network takes of the samples `numbers`: an array, or several by name."""
         return self.views(numbers)
 
     def changed(
@@ -150,14 +152,14 @@ class ViewSamples(Samples):
     """Samples held in memory, read from cache files; the scheme's columns only."""
 
     def __init__(
-        self, paths: list[str | Path], columns: list[int], folds: set[tuple[str, str]]
+        self, paths: Sequence[str | Path], columns: list[int], folds: set[tuple[str, str]]
     ) -> None:
         """paths: cache files; columns: views to keep; folds: the (group, fold) pairs to keep.
 
         Raises: InputError naming a file that is no cache, differs in size, or where nothing is
         left.
         """
-        images = []
+        images: list[np.ndarray] = []
         facts = []
         for path in sorted(map(Path, paths)):
             of_file, facts_of_file = _load(path, columns, folds)
@@ -174,10 +176,11 @@ class ViewSamples(Samples):
         # Fill one array in place; np.concatenate would temporarily hold every image twice.
         self.images = np.empty((sum(map(len, images)), *images[0].shape[1:]), dtype=np.uint8)
         start = 0
-        for number, array in enumerate(images):
+        images.reverse()
+        while images:
+            array = images.pop()
             self.images[start : start + len(array)] = array
             start += len(array)
-            images[number] = None
         self.facts = joined(facts)
         self.size = self.images.shape[-1]
 

@@ -3,8 +3,9 @@
 `config/schemes.csv` contains the rows of the paper's tables, one line per scheme:
 
     scheme      published name, "ABC:VRP+TRP+VT"; also the key of accuracy.csv
-    stations    names of stations of the run's network, joined by "+"; names of one letter may stand
-    together, "ABC" spectra     spectra joined by "+"
+    stations    names of stations of the run's network, joined by "+"; names of one letter may
+                stand together, "ABC"
+    spectra     spectra joined by "+"
     fusion      attention (the paper's proposal) | mean (its baseline)
     backbone    timm name, or empty for the configuration's own backbone
     protocols   protocols in whose tables the paper has this row, joined by "+"
@@ -37,8 +38,11 @@ OPTIONAL = ("size", "steps", "share")
 
 @dataclass(frozen=True)
 class Scheme:
-    """One row: `stations` and `spectra` are index tuples into the network's stations and SPECTRA;
-    size and steps are 0 where the row leaves them to the configuration."""
+    """One row of the table of schemes.
+
+    stations, spectra: indices into the network's stations and SPECTRA; size, steps: 0 where the row
+    leaves them to the configuration.
+    """
 
     name: str
     stations: tuple[int, ...]
@@ -93,13 +97,15 @@ def of_record(record: dict) -> Scheme:
 
 
 def with_scheme(settings: dict) -> tuple[Scheme, dict]:
-    """Return the scheme that the settings of a training hold as a record, and the others as the
-    scheme settles them.
+    """Return the scheme that the settings of a training hold as a record, and the other settings.
+
+    The others are as the scheme settles them.
 
     Raises: InputError where there is no record of a scheme, or a wrong one.
     """
     others = {**settings}
-    check_brought("scheme", record := others.pop("scheme", None), "settings.scheme")
+    record = others.pop("scheme", None)
+    check_brought("scheme", record, "settings.scheme")
     scheme = of_record(record)
     return scheme, scheme.settled(others)
 
@@ -122,27 +128,23 @@ def columns_in(
         raise InputError(
             f"{where}: spectra {list(spectra)}, the scheme also needs {sorted(lacking)}"
         )
-    return [
-        len(spectra) * station + list(spectra).index(NAMES[number]) for station, number in pairs
-    ]
+    names = list(spectra)
+    return [len(names) * station + names.index(NAMES[number]) for station, number in pairs]
 
 
 def _indices(
-    text: str, parts: list[str], known: tuple[str, ...], kind: str, where: str
+    text: str, listed: list[str], known: tuple[str, ...], kind: str, where: str
 ) -> tuple[int, ...]:
-    """Return the sorted places of names among the known ones; refuse an unknown name or one given
-    twice.
-    """
-    if not parts or len(set(parts)) != len(parts) or not set(parts) <= set(known):
+    """Return the sorted indices of names among the known ones; refuse unknown or repeated ones."""
+    if not listed or len(set(listed)) != len(listed) or not set(listed) <= set(known):
         raise InputError(f"{where}: {kind} {text!r}, expected some of {known}, each once")
-    return tuple(sorted(known.index(part) for part in parts))
+    return tuple(sorted(known.index(name) for name in listed))
 
 
 def _number(row: dict, column: str, kind: type, low: float, high: float, where: str) -> float:
-    """Return the number in an optional column, its default where the cell is empty; refuse one out
-    of range.
-    """
-    if not (text := row.get(column)):
+    """Return the number in an optional column, its default where the cell is empty."""
+    text = row.get(column)
+    if not text:
         return 1.0 if column == "share" else 0
     try:
         value = kind(text)
@@ -158,18 +160,22 @@ def _number(row: dict, column: str, kind: type, low: float, high: float, where: 
 def _station_names(text: str, known: Sequence[str]) -> list[str]:
     """Split names of stations, "north+south" or "ABC"."""
     names = text.split("+")
-    return names if set(names) <= set(known) else list(text)
+    if set(names) <= set(known):
+        return names
+    return list(text)
 
 
 def joined(names: Sequence[str]) -> str:
     """Return names of stations as the table of schemes writes them: "ABC", "north+south"."""
-    return ("" if all(len(name) == 1 for name in names) else "+").join(names)
+    if all(len(name) == 1 for name in names):
+        return "".join(names)
+    return "+".join(names)
 
 
 def scheme(row: dict, where: str, stations: Sequence[str]) -> Scheme:
-    """Return the scheme of one table row (all values are strings) for a network of these stations,
-    in its order.
+    """Return the scheme of one row of the table for a network of these stations, in its order.
 
+    All values of the row are strings.
     Raises: InputError naming `where`, the column and the value.
     """
     if set(row) - set(OPTIONAL) != set(COLUMNS):
@@ -196,7 +202,7 @@ def scheme(row: dict, where: str, stations: Sequence[str]) -> Scheme:
 
 
 def _rows(path: str | Path) -> dict[str, tuple[dict, str]]:
-    """Rows of a table, each with its place in words, by the scheme's name; no name stands twice."""
+    """Rows of a table, each with its file and line in words, by the scheme's name."""
     rows: dict[str, tuple[dict, str]] = {}
     for number, row in enumerate(read_csv(path, "scheme", what="table of schemes"), start=2):
         name = row["scheme"]
@@ -210,8 +216,9 @@ def _rows(path: str | Path) -> dict[str, tuple[dict, str]]:
 
 
 def names(path: str | Path) -> list[str]:
-    """Return the names of all schemes of a table, in its order. Raises: InputError for a name that
-    stands twice.
+    """Return the names of all schemes of a table, in its order.
+
+    Raises: InputError for a name that stands twice.
     """
     return list(_rows(path))
 
@@ -225,9 +232,9 @@ def read(path: str | Path, stations: Sequence[str]) -> dict[str, Scheme]:
 
 
 def named(path: str | Path, name: str, stations: Sequence[str]) -> Scheme:
-    """Return the scheme called `name` (or with that slug) from a table; its other rows may name
-    other stations.
+    """Return the scheme called `name` (or with that slug) from a table.
 
+    The table's other rows may name other stations.
     Raises: InputError naming the schemes there are, or what is wrong with this one.
     """
     rows = _rows(path)

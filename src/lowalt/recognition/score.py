@@ -1,6 +1,4 @@
-"""The scorer for other people's predictions: truth comes from the shards, never from the file that
-is scored.
-"""
+"""The scorer for other people's predictions, which takes the truth from the shards alone."""
 
 from pathlib import Path
 

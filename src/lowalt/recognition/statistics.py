@@ -1,6 +1,6 @@
-"""Numbers from predictions: accuracy, confusion, calibration, thresholds and false alarms. NumPy
-only.
+"""Numbers from predictions: accuracy, confusion, calibration, thresholds and false alarms.
 
+NumPy alone is needed.
 Intervals of means and differences are those of `lowalt.recognition.intervals`.
 """
 
@@ -12,18 +12,16 @@ from lowalt.recognition.intervals import Interval, model_weights
 from lowalt.recognition.predictions import Predictions
 
 LOOKED_FOR = 0
-"""Label of the target class, whose detections and false alarms are counted: the first class, by
-default UAV.
-"""
+"""Label of the target class, whose detections and false alarms are counted: the first class."""
 FEWEST_MISSED = 10
-"""A threshold must leave at least this many validation samples of the target class undetected. The
-standard deviation of that number is then a third of it."""
+"""A threshold must leave at least this many validation samples of the target class undetected.
+
+The standard deviation of that number is then a third of it.
+"""
 
 
 class AlarmPart(NamedTuple):
-    """Data for counting false alarms, each (samples,): target class's probability, label, motion
-    model, subtype.
-    """
+    """Data for counting false alarms, each (samples,): scores, label, motion model, subtype."""
 
     scores: np.ndarray
     labels: np.ndarray
@@ -32,23 +30,23 @@ class AlarmPart(NamedTuple):
 
 
 def cross_entropy(probabilities: np.ndarray, labels: np.ndarray) -> float:
-    """Mean negative log of the true class's probability; probabilities (samples, classes), labels
-    (samples,).
+    """Mean negative log of the true class's probability.
+
+    probabilities: (samples, classes); labels: (samples,).
     """
     chosen = probabilities[np.arange(len(labels)), labels]
     return float(-np.log(np.maximum(chosen, np.finfo(float).tiny)).mean())
 
 
 def accuracy_by(groups: np.ndarray, correct: np.ndarray) -> dict:
-    """Share of correct samples and their number in each group, in sorted order: {group: (share,
-    samples)}.
-    """
-    names, place = np.unique(groups, return_inverse=True)
-    count = np.bincount(place)
-    hits = np.bincount(place, weights=correct)
-    return {
-        name.item(): (float(h / n), int(n)) for name, h, n in zip(names, hits, count, strict=True)
-    }
+    """Share of correct samples and their number in each group, in sorted order of the groups."""
+    names, group = np.unique(groups, return_inverse=True)
+    counts = np.bincount(group)
+    hits = np.bincount(group, weights=correct)
+    shares = {}
+    for name, hit, count in zip(names, hits, counts, strict=True):
+        shares[name.item()] = (float(hit / count), int(count))
+    return shares
 
 
 def confusion(labels: np.ndarray, guesses: np.ndarray, classes: int) -> np.ndarray:
@@ -64,8 +62,8 @@ def calibration(probabilities: np.ndarray, labels: np.ndarray, bins: int = 15) -
     """
     confidence = probabilities.max(1)
     guesses = probabilities.argmax(1)
-    place = np.minimum((confidence * bins).astype(int), bins - 1)
-    gap = np.bincount(place, weights=confidence - (guesses == labels), minlength=bins)
+    bin_of = np.minimum((confidence * bins).astype(int), bins - 1)
+    gap = np.bincount(bin_of, weights=confidence - (guesses == labels), minlength=bins)
     truth = np.eye(probabilities.shape[1])[labels]
     return {
         "calibration_error": float(np.abs(gap).sum() / len(labels)),
@@ -75,8 +73,7 @@ def calibration(probabilities: np.ndarray, labels: np.ndarray, bins: int = 15) -
 
 
 def threshold(scores: np.ndarray, labels: np.ndarray, detection: float) -> float:
-    """Largest threshold on the probability of the target class that still detects at least a share
-    `detection` of it.
+    """Largest threshold on the target class's probability that detects a share `detection` of it.
 
     scores (samples,), labels (samples,); a sample is detected where its score is at least the
     threshold. Set it on validation samples, never on the samples that it is then tested on.
@@ -87,8 +84,9 @@ def threshold(scores: np.ndarray, labels: np.ndarray, detection: float) -> float
 
 
 def measurable(labels: np.ndarray, detection: float) -> bool:
-    """Whether a threshold for `detection` can be set on validation samples: at least
-    `FEWEST_MISSED` samples of the target class are below it.
+    """Whether validation samples can set a threshold for `detection`.
+
+    At least `FEWEST_MISSED` samples of the target class must be below it.
 
     labels (samples,) of the validation samples. With fewer, a handful of samples would decide the
     threshold.
@@ -112,8 +110,10 @@ def alarm_intervals(
     classes: int,
     repeats: int = 400,
 ) -> np.ndarray:
-    """Bounds (classes, 2) of the 95 % intervals of detection and of the false alarm rates of the
-    other classes.
+    """Bounds (classes, 2) of the 95 % intervals of detection and of the false alarm rates.
+
+    The first row is the detection of the first class, the others are the false alarms of each other
+    class.
 
     validation, test: one part for each training seed, samples in the same order. Every repeat draws
     seeds, motion models of both parts and, with `whole_subtypes`, subtypes of the test part. It
@@ -122,11 +122,9 @@ def alarm_intervals(
     """
 
     def sample_weights(part: AlarmPart, whole: bool) -> np.ndarray:
-        """Return how often each sample is drawn in each repeat, (repeats, samples), by its motion
-        model.
-        """
-        _, first, place = np.unique(part.motion, return_index=True, return_inverse=True)
-        return model_weights(part.subtypes[first], whole, repeats, generator)[:, place]
+        """Return how often each repeat draws each sample, (repeats, samples), by its model."""
+        _, first, model = np.unique(part.motion, return_index=True, return_inverse=True)
+        return model_weights(part.subtypes[first], whole, repeats, generator)[:, model]
 
     judged = sample_weights(test[0], whole_subtypes)
     set_on = sample_weights(validation[0], False)
@@ -141,16 +139,17 @@ def alarm_intervals(
                 validation[seed].scores[wanted], set_on[repeat, wanted], detection
             )
             called = test[seed].scores >= level
-            totals = [judged[repeat, members].sum() for members in of_class]
-            hits = [judged[repeat, members] @ called[members] for members in of_class]
-            rates.append(
-                [hit / total if total else np.nan for hit, total in zip(hits, totals, strict=True)]
-            )
+            of_seed = np.full(classes, np.nan)
+            for label, members in enumerate(of_class):
+                weights = judged[repeat, members]
+                if weights.sum():
+                    of_seed[label] = weights @ called[members] / weights.sum()
+            rates.append(of_seed)
         resampled[repeat] = np.mean(rates, axis=0)
     kept = resampled[~np.isnan(resampled).any(1)]
-    return (
-        np.quantile(kept, [0.025, 0.975], axis=0).T if len(kept) else np.full((classes, 2), np.nan)
-    )
+    if not len(kept):
+        return np.full((classes, 2), np.nan)
+    return np.quantile(kept, [0.025, 0.975], axis=0).T
 
 
 def alarm_rates(
@@ -158,12 +157,12 @@ def alarm_rates(
 ) -> tuple[float, np.ndarray]:
     """Detection rate at a threshold, and false alarm rates (classes - 1,) of the other classes."""
     called = scores >= level
-    return float(called[labels == LOOKED_FOR].mean()), np.array(
-        [
-            called[labels == other].mean() if (labels == other).any() else np.nan
-            for other in range(1, classes)
-        ]
-    )
+    alarms = np.full(classes - 1, np.nan)
+    for other in range(1, classes):
+        members = labels == other
+        if members.any():
+            alarms[other - 1] = called[members].mean()
+    return float(called[labels == LOOKED_FOR].mean()), alarms
 
 
 def pareto(cost: np.ndarray, value: np.ndarray) -> np.ndarray:
@@ -195,12 +194,13 @@ def macro_f1(counts: np.ndarray) -> np.ndarray:
 
 
 def _counts(
-    predictions: Predictions, chosen: np.ndarray, place: np.ndarray, models: int, classes: int
+    predictions: Predictions, chosen: np.ndarray, model: np.ndarray, models: int, classes: int
 ) -> np.ndarray:
-    """Confusion counts (models, classes, classes) of the samples `chosen`; place (samples,): their
-    motion models.
+    """Confusion counts (models, classes, classes) of the samples `chosen`.
+
+    model (samples,): the number of each sample's motion model.
     """
-    cell = (place * classes + predictions.label) * classes + predictions.guesses
+    cell = (model * classes + predictions.label) * classes + predictions.guesses
     return np.bincount(cell[chosen], minlength=models * classes**2).reshape(
         models, classes, classes
     )
@@ -221,20 +221,20 @@ def f1_by_snr(
     Source: `lowalt.recognition.statistics.alarm_intervals`, which draws likewise.
     """
     test = parts[0]
-    _, first, place = np.unique(test.motion, return_index=True, return_inverse=True)
+    _, first, model = np.unique(test.motion, return_index=True, return_inverse=True)
     weights = model_weights(test.subtype[first], whole_subtypes, repeats, generator)
     drawn = generator.integers(0, len(parts), (repeats, len(parts)))
-    values = {}
-    resampled = {}
+    values: dict[float | str, float] = {}
+    resampled: dict[float | str, np.ndarray] = {}
     for snr in np.unique(test.snr_db).tolist():
         counts = [
-            _counts(predictions, test.snr_db == snr, place, len(first), classes)
+            _counts(predictions, test.snr_db == snr, model, len(first), classes)
             for predictions in parts
         ]
         values[snr] = float(np.mean([macro_f1(seed.sum(0)) for seed in counts]))
         of_seed = np.stack([macro_f1(np.tensordot(weights, seed, 1)) for seed in counts], axis=1)
         resampled[snr] = np.take_along_axis(of_seed, drawn, axis=1).mean(1)
-    values["avg"] = np.mean(list(values.values()))
+    values["avg"] = float(np.mean(list(values.values())))
     resampled["avg"] = np.mean(list(resampled.values()), axis=0)
     bounds = {snr: np.quantile(means, [0.025, 0.975]) for snr, means in resampled.items()}
     return {snr: Interval(float(value), *map(float, bounds[snr])) for snr, value in values.items()}

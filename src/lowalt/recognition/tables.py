@@ -2,30 +2,29 @@
 
 The first columns of each file are `protocol, scheme`:
     accuracy.csv     snr_db ("avg": mean over the SNRs), accuracy_percent, macro F1 in percent with
-    its 95 % interval,
-                     samples, hardware; averages over several seeds; seeds is their number,
-                     spread_points their standard deviation (empty for one)
+                     its 95 % interval, samples, hardware; averages over several seeds; seeds is
+                     their number, spread_points their standard deviation (empty for one)
     seen_test.csv    the same for the seen subtypes' test fold in the unseen protocol
     seeds.csv        one row per training: accuracy_percent on average over the SNRs, its network,
-    cost and hardware confusion.csv    category, predicted, samples
-    confusion_by_snr.csv  snr_db, category, predicted, samples
+                     cost and hardware
+    confusion.csv    category, predicted, samples
+    confusion_by_snr.csv
+                     snr_db, category, predicted, samples
     subtypes.csv     category, subtype, accuracy_percent, samples
     ranges.csv       band of the distance to the nearest station used, accuracy_percent, samples
     aspects.csv      band of the aspect seen from that station, accuracy_percent, samples
     alarms.csv       required detection of the first class, its threshold (set on validation), and
-    on test the
-                     detection and the false alarms of the other classes with 95 % intervals. Each
-                     model has its own threshold; values are means over the seeds. "not measurable"
-                     where fewer than ten validation samples would be below the threshold
+                     on test the detection and the false alarms of the other classes with 95 %
+                     intervals. Each model has its own threshold; values are means over the seeds.
+                     "not measurable" where fewer than ten validation samples would be below the
+                     threshold
     calibration.csv  calibration error, Brier score, cross entropy on test, means over the seeds
-    comparisons.csv  over: the scheme compared with; difference with its 95 % interval, and what the
-    interval resamples:
-                     training seeds (where there are several), subtypes (unseen protocol), motion
-                     models
+    comparisons.csv  over: the scheme compared with; difference with its 95 % interval, and what
+                     the interval resamples: training seeds (where there are several), subtypes
+                     (unseen protocol), motion models
     orderings.csv    the paper's claims: its own difference, ours, and whether its ordering holds
-    here (the interval
-                     lies above zero), is reversed (below), undecided (zero inside) or not ranked
-                     (fewer than 3 seeds)
+                     here (the interval lies above zero), is reversed (below), undecided (zero
+                     inside) or not ranked (fewer than 3 seeds)
 """
 
 from collections.abc import Callable, Iterable
@@ -44,6 +43,16 @@ from lowalt.recognition.predictions import Predictions
 
 F1 = ("macro_f1_percent", "macro_f1_low", "macro_f1_high")
 """Columns of accuracy.csv with macro F1 and the bounds of its 95 % interval."""
+ACCURACY = (
+    "snr_db",
+    "accuracy_percent",
+    *F1,
+    "samples",
+    "hardware",
+    "seeds",
+    "spread_points",
+)
+"""Columns of accuracy.csv behind protocol and scheme."""
 TRAINING = (
     "backbone",
     "weights",
@@ -72,11 +81,10 @@ def snr_text(snr_db: float) -> str:
 
 
 def accuracy_rows(runs: list[Evaluated], part: str, seed: int) -> Iterable[list]:
-    """Yield rows [snr_db, accuracy_percent, *F1, samples, hardware, seeds, spread_points] of one
-    scheme's runs.
+    """Yield the rows of accuracy.csv of one scheme's runs.
 
-    Values are means over the runs, one per training seed; seed: of the bootstrap. Intervals of
-    macro F1 resample whole subtypes if these are held out from training.
+    The columns are ACCURACY. Values are means over the runs, one per training seed; seed: of the
+    bootstrap. Intervals of macro F1 resample whole subtypes if these are held out from training.
     """
     parts = [run.part(part) for run in runs]
     protocol = runs[0].protocol
@@ -86,7 +94,8 @@ def accuracy_rows(runs: list[Evaluated], part: str, seed: int) -> Iterable[list]
     scores = {}
     f1_by_snr = statistics.f1_by_snr(parts, len(runs[0].classes), whole, generator)
     for snr, interval in f1_by_snr.items():
-        scores[snr if snr == "avg" else snr_text(snr)] = interval
+        name_of_snr = snr if isinstance(snr, str) else snr_text(snr)
+        scores[name_of_snr] = interval
     of_runs = [statistics.accuracy_by(run.snr_db, run.correct) for run in parts]
     shares = {}
     counts = {}
@@ -108,19 +117,28 @@ def seed_rows(runs: list[Evaluated]) -> Iterable[list]:
         by_snr = statistics.accuracy_by(run.test.snr_db, run.test.correct)
         shares = [share for share, _ in by_snr.values()]
         known = [run.about.get(name, "") for name in TRAINING]
-        took = [f"{value:.6g}" if isinstance(value, float) else value for value in known]
-        yield [run.seed, percent(np.mean(shares)), *took, run.hardware]
+        yield [run.seed, percent(np.mean(shares)), *map(_six_digits, known), run.hardware]
+
+
+def _six_digits(value: object) -> object:
+    """A float as text with six digits, anything else as it is."""
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    return value
 
 
 def confusion_rows(runs: list[Evaluated], snr_db: float | None = None) -> Iterable[list]:
-    """Yield rows [category, predicted, samples], summed over the seeds, at one SNR (dB) or over
-    all.
+    """Yield rows [category, predicted, samples], summed over the seeds.
+
+    snr_db: the SNR (dB) to count; None counts all.
     """
     classes = runs[0].classes
-    counts = 0
-    for test in (run.test for run in runs):
-        some = slice(None) if snr_db is None else test.snr_db == snr_db
-        counts = counts + statistics.confusion(test.label[some], test.guesses[some], len(classes))
+    counts = np.zeros((len(classes), len(classes)), int)
+    for run in runs:
+        test = run.test
+        if snr_db is not None:
+            test = test.take(test.snr_db == snr_db)
+        counts += statistics.confusion(test.label, test.guesses, len(classes))
     for true, name in enumerate(classes):
         for guess, other in enumerate(classes):
             yield [name, other, counts[true, guess]]
@@ -141,25 +159,30 @@ def subtype_rows(runs: list[Evaluated]) -> Iterable[list]:
     }
     correct = np.mean([run.test.correct for run in runs], axis=0)
     table = statistics.accuracy_by(test.subtype, correct)
-    for name in sorted(
-        table, key=lambda name: (classes.index(category[name]), table[name][0], name)
-    ):
-        yield [category[name], name, percent(table[name][0]), table[name][1]]
+
+    def worst_first(name: str) -> tuple:
+        """By class, then by accuracy."""
+        share, _ = table[name]
+        return classes.index(category[name]), share, name
+
+    for name in sorted(table, key=worst_first):
+        share, count = table[name]
+        yield [category[name], name, percent(share), count]
 
 
 def band_rows(
     runs: list[Evaluated], values: Callable[[Predictions], np.ndarray], width: float
 ) -> Iterable[list]:
-    """Yield rows [from, to, accuracy_percent, samples] for bands of a value; samples without the
-    value are omitted.
+    """Yield rows [from, to, accuracy_percent, samples] for bands of a value.
+
+    Samples without the value are omitted.
     """
     test = runs[0].test
     numbers = values(test)
     known = ~np.isnan(numbers)
     correct = np.mean([run.test.correct for run in runs], axis=0)
-    for band, (share, count) in statistics.accuracy_by(
-        np.floor(numbers[known] / width), correct[known]
-    ).items():
+    bands = statistics.accuracy_by(np.floor(numbers[known] / width), correct[known])
+    for band, (share, count) in bands.items():
         yield [f"{band * width:g}", f"{(band + 1) * width:g}", percent(share), count]
 
 
@@ -174,8 +197,9 @@ def _alarm_part(predictions: Predictions) -> statistics.AlarmPart:
 
 
 def alarm_rows(runs: list[Evaluated], seed: int) -> Iterable[list]:
-    """Yield rows [asked, threshold, rate, low, high, ...]: detection of the first class, then false
-    alarms of others.
+    """Yield rows [asked, threshold, rate, low, high, ...] of detection and false alarms.
+
+    Detection is that of the first class; the false alarms of the others follow.
 
     In percent, with 95 % intervals; thresholds come from validation samples. "not measurable" where
     there are too few validation samples to set a threshold.
@@ -183,11 +207,9 @@ def alarm_rows(runs: list[Evaluated], seed: int) -> Iterable[list]:
     classes = len(runs[0].classes)
     validations = [_alarm_part(run.part("validation")) for run in runs]
     tests = [_alarm_part(run.test) for run in runs]
-    for asked in (
-        DETECTIONS
-        if all((part.labels == statistics.LOOKED_FOR).any() for part in validations)
-        else ()
-    ):
+    if not all((part.labels == statistics.LOOKED_FOR).any() for part in validations):
+        return
+    for asked in DETECTIONS:
         if not statistics.measurable(validations[0].labels, asked):
             yield [percent(asked), *["not measurable"] * (1 + 3 * classes)]
             continue
@@ -281,14 +303,13 @@ def write(
         group.append(run)
     keys = sorted(groups, key=lambda key: (key[0], order.index(key[1])))
     share = ["accuracy_percent", "samples"]
-    measured = ["snr_db", "accuracy_percent", *F1, "samples", "hardware", "seeds", "spread_points"]
     bands = ["from", "to", *share]
     rates = ("detected", *map(word, _one_set(runs)[1:]))
     alarm = ["asked_percent", "threshold"]
     for rate in rates:
         alarm += [f"{rate}_percent", f"{rate}_low", f"{rate}_high"]
     tables = {
-        "accuracy": (measured, lambda group: accuracy_rows(group, "test", seed)),
+        "accuracy": (list(ACCURACY), lambda group: accuracy_rows(group, "test", seed)),
         "seeds": (["seed", "accuracy_percent", *TRAINING, "hardware"], seed_rows),
         "confusion": (["category", "predicted", "samples"], confusion_rows),
         "confusion_by_snr": (["snr_db", "category", "predicted", "samples"], confusion_by_snr_rows),
@@ -309,7 +330,7 @@ def write(
         if protocol == "unseen" and len(group[0].part("seen_test")):
             rows = accuracy_rows(group, "seen_test", seed)
             seen += [[protocol, scheme, *row] for row in rows]
-    _write(Path(folder) / "seen_test.csv", measured, seen)
+    _write(Path(folder) / "seen_test.csv", list(ACCURACY), seen)
     compared = _compared(groups, seed)
     columns = ["over", "claim", "resampled", "seeds", "difference_points", "low", "high"]
     _write(Path(folder) / "comparisons.csv", columns, compared)

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from lowalt.config.brought import refuse_brought, refuse_weights
 from lowalt.config.layers import SCHEMA, check, of_run
 from lowalt.config.named_code import allowed
 from lowalt.config.network import station_names
@@ -20,6 +21,8 @@ from lowalt.recognition.schemes import named
 from lowalt.recognition.score import scores
 from lowalt.shards import ShardSet
 
+BY_ARGUMENT = "none, or the argument `weights` with a file that you trust or 'hub'"
+
 
 def train(
     run: str | Path,
@@ -28,23 +31,30 @@ def train(
     seed: int = 0,
     out: str | Path = "model",
     backbone: str = "",
+    weights: str = "",
     **training: object,
 ) -> runs.Trained:
-    """Train a scheme on the data set of a finished run and return the model, which stays in
-    `out`/model.safetensors.
+    """Train a scheme on the data set of a finished run and return the model.
+
+    The model stays in `out`/model.safetensors.
 
     run: its folder, such as results/default; scheme: a name of config/schemes.csv; protocol:
     "unseen" trains on twenty subtypes and tests on the others, "seen" trains and tests on other
-    motion of all; backbone: FILE.py:FUNCTION of your own, which a run's folder may not choose;
-    training: settings that replace the run's own, such as steps=500. A training that was
-    interrupted goes on.
-    Raises: InputError for a run that is not finished or names code, or a wrong name or setting.
+    motion of all; backbone: FILE.py:FUNCTION of your own, weights: hub or a file of your own to
+    begin with, which a run's folder may not choose; training: settings that replace the run's own,
+    such as steps=500. A training that was interrupted goes on.
+    Raises: InputError for a run that is not finished, or names code, weights or files elsewhere, or
+    a wrong name or setting.
     """
     config, index = _opened(run)
     block = config["recognition"]
+    refuse_brought({"recognition": {"table": block["table"]}}, Path(run) / "config.yaml")
+    if not weights:
+        weights = block["network"]["weights"]
+        refuse_weights(weights, run, BY_ARGUMENT)
     chosen = named(block["table"], scheme, station_names(config["network"]))
     name = backbone or allowed(chosen.backbone_of(block["network"]), "", run)
-    network = {**block["network"], "backbone": name}
+    network = {**block["network"], "backbone": name, "weights": weights}
     settings = chosen.settled(
         {
             "size": block["size"],
@@ -75,7 +85,10 @@ def evaluate(model: runs.Trained | str | Path, run: str | Path, backbone: str = 
     calibration.
     Raises: InputError for a run that is not finished, or a model that does not fit its images.
     """
-    trained = model if isinstance(model, runs.Trained) else runs.opened(model, backbone)[0]
+    if isinstance(model, runs.Trained):
+        trained = model
+    else:
+        trained, _ = runs.opened(model, backbone)
     config, index = _opened(run)
     settings = config["recognition"]["evaluation"]
     machine = Machine.here(inference.evaluation(settings)[2])
@@ -87,8 +100,10 @@ def evaluate(model: runs.Trained | str | Path, run: str | Path, backbone: str = 
 
 
 class Confusion(NamedTuple):
-    """Names of the classes (C,), and the number of test samples (C, C) int of each true class (row)
-    that each class (column) was the answer for."""
+    """The classes (C,), and the number of test samples (C, C) int by true class and answer.
+
+    Rows are true classes, columns answers.
+    """
 
     classes: tuple[str, ...]
     samples: np.ndarray
@@ -105,28 +120,30 @@ def confusion(
     protocol: str = "unseen",
     snr_db: float | None = None,
 ) -> Confusion:
-    """Return what a finished run's networks took for what, at one SNR (dB; `math.inf`: no noise) or
-    over all.
+    """Return what a finished run's networks took for what.
 
-    run: its folder; scheme, protocol: as in its table confusion_by_snr.csv, which sums over the
-    training seeds.
+    snr_db: the SNR (dB), `math.inf` for no noise, or None for all; run: its folder; scheme,
+    protocol: as in its table confusion_by_snr.csv, which sums over the training seeds.
     Raises: InputError for a folder without that table, or a scheme, a protocol or an SNR that it
     lacks.
     """
     path = Path(run) / "confusion_by_snr.csv"
     rows = read_csv(path, "protocol", "scheme", "snr_db", "category", "predicted", "samples")
-    for column, wanted in (("protocol", protocol), ("scheme", scheme), ("snr_db", snr_db)):
-        text = f"{wanted:g}" if column == "snr_db" and wanted is not None else wanted
+    wanted: dict[str, str | float] = {"protocol": protocol, "scheme": scheme}
+    if snr_db is not None:
+        wanted["snr_db"] = snr_db
+    for column, value in wanted.items():
+        text = value if isinstance(value, str) else f"{value:g}"
         known = list(dict.fromkeys(row[column] for row in rows))
-        if text is not None and text not in known:
-            raise InputError(f"{path}: {column} {wanted!r} is not there, expected one of {known}")
-        rows = [row for row in rows if text in (None, row[column])]
+        if text not in known:
+            raise InputError(f"{path}: {column} {value!r} is not there, expected one of {known}")
+        rows = [row for row in rows if row[column] == text]
     classes = tuple(dict.fromkeys(row["category"] for row in rows))
     samples = np.zeros((len(classes), len(classes)), int)
     for row in rows:
-        samples[classes.index(row["category"]), classes.index(row["predicted"])] += int(
-            number(row, "samples", path)
-        )
+        true = classes.index(row["category"])
+        answer = classes.index(row["predicted"])
+        samples[true, answer] += int(number(row, "samples", path))
     return Confusion(classes, samples)
 
 
@@ -141,6 +158,7 @@ def _opened(run: str | Path) -> tuple[dict, Path]:
     try:
         return located(check(of_run(folder), shipped(SCHEMA))), index
     except InputError as error:
-        raise InputError(
-            str(error) if str(folder) in str(error) else f"{folder / 'config.yaml'}: {error}"
-        ) from None
+        message = str(error)
+        if str(folder) not in message:
+            message = f"{folder / 'config.yaml'}: {message}"
+        raise InputError(message) from None

@@ -1,5 +1,4 @@
-"""Training in plain torch: deterministic order, exact resume, early stopping on validation, an
-error at the first NaN.
+"""Training in plain torch: deterministic, exactly resumed, stopped early, refused at a NaN.
 
 An exact resume needs access to the order of samples and to every random state, which training
 libraries hide; without a library the loop is still one page. The settings are those of
@@ -9,14 +8,14 @@ libraries hide; without a library the loop is still one page. The settings are t
 import math
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-import timm
 import torch
+from timm.utils import ModelEmaV3
 from torch import nn
 
 from lowalt.files.csv_tables import write_csv
@@ -47,8 +46,7 @@ Metrics = Callable[[int, dict[str, float]], None]
 
 
 def tensorboard(folder: str | Path, first: int) -> Metrics:
-    """Return a function (step, {name: value}) that appends to TensorBoard's event files in
-    `folder`.
+    """Return a function (step, {name: value}) that appends to TensorBoard's files in `folder`.
 
     first: the step that the run starts from; entries of an earlier, killed run after it are
     removed.
@@ -73,8 +71,11 @@ def tensorboard(folder: str | Path, first: int) -> Metrics:
 
 
 class TrainingRun(NamedTuple):
-    """Identification of a run. keys: names of its random streams; identity: text stored in its
-    checkpoints; folder: where its files are written."""
+    """Identification of a run.
+
+    keys: names of its random streams; identity: text stored in its checkpoints; folder: where its
+    files are written.
+    """
 
     keys: tuple
     identity: str
@@ -98,22 +99,21 @@ class TrainingState:
 
 
 class Trainer:
-    """One training run: `finish` writes the best averaged weights (`model.safetensors`) and
-    `history.csv`.
-    """
+    """One training run; `finish` writes the best averaged weights and `history.csv`."""
 
     def __init__(
         self,
         model: nn.Module,
-        samples: dict[str, Samples],
+        samples: Mapping[str, Samples],
         columns: list[int],
         settings: dict,
         run: TrainingRun,
         machine: Machine,
     ) -> None:
-        """model: a Recogniser; samples: the sources "train" and "validation"; columns: views of the
-        scheme.
+        """Take the network, the samples and the settings.
 
+        model: a Recogniser; samples: the sources "train" and "validation"; columns: views of the
+        scheme.
         settings: {seed, training (as `recipe.check` returns it), augmentation, classes}.
         Raises: InputError for a class without training samples.
         """
@@ -132,14 +132,15 @@ class Trainer:
             recogniser.checkpoint_activations(model)
         layout = torch.channels_last if self.block["channels_last"] else torch.contiguous_format
         shared = machine.with_shared_statistics(model)
-        plain = not machine.gpu and not self.block["compile"] and machine.precision == "fp32"
-        shared = as_products(shared) if plain else shared
+        if not machine.gpu and not self.block["compile"] and machine.precision == "fp32":
+            shared = as_products(shared)
         self.model = shared.to(machine.device, memory_format=layout)
         self.optimiser = optimiser(self.model, self.block)
-        self.average = timm.utils.ModelEmaV3(self.model)
-        self.step_model = machine.parallel(
-            torch.compile(self.model) if self.block["compile"] else self.model
-        ).train()
+        self.average = ModelEmaV3(self.model)
+        step_model = self.model
+        if self.block["compile"]:
+            step_model = torch.compile(self.model)
+        self.step_model = machine.parallel(step_model).train()
         # Create the readers once: their workers then live through all epochs and validations.
         keys = (self.seed, *run.keys)
         augmented = Augmented(
@@ -272,27 +273,26 @@ class Trainer:
             accuracy,
         )
         self.at.history.append(row)
+        self.at.since_best += 1
+        if accuracy > self.at.best:
+            self.at.since_best = 0
         if accuracy >= self.at.best:
-            self.at.since_best = 0 if accuracy > self.at.best else self.at.since_best + 1
             self.at.best = accuracy
             weights = self.average.module.state_dict()
             self.best_weights = {
                 key: value.detach().cpu().clone() for key, value in weights.items()
             }
-        else:
-            self.at.since_best += 1
         self.at.loss_sum = 0.0
         self.at.loss_steps = 0
         self.at.done = bool(self.block["patience"]) and self.at.since_best >= self.block["patience"]
 
     def fit(self) -> TrainingState:
-        """Train until the last step or until validation stops improving, starting at the current
-        state.
-        """
+        """Train from the current state to the last step, or until validation stops improving."""
         start = time.monotonic()
         saved = time.monotonic()
         first = self.at.steps
-        report = Reporter(steps := self.block["steps"], "steps")
+        steps = self.block["steps"]
+        report = Reporter(steps, "steps")
         while self.at.steps < steps and not self.at.done:
             order = epoch_order(
                 self.train.facts,
@@ -301,11 +301,10 @@ class Trainer:
                 self.at.epoch,
                 self.block["snrs_per_model"],
             )
-            parts = batches(order, self.block["batch"])
+            of_epoch = batches(order, self.block["batch"])
+            remaining = of_epoch[self.at.batch :][: steps - self.at.steps]
             # Number the batches by step: the step alone determines the augmentation.
-            numbered = list(enumerate(parts[self.at.batch :], start=self.at.steps))[
-                : steps - self.at.steps
-            ]
+            numbered = list(enumerate(remaining, start=self.at.steps))
             read = self.read(numbered)
             for _ in numbered:
                 asked = time.monotonic()
@@ -323,14 +322,15 @@ class Trainer:
                     saved = time.monotonic()
                 if self.at.done:
                     break
-            if self.at.batch == len(parts):
-                self.at.epoch = self.at.epoch + 1
+            if self.at.batch == len(of_epoch):
+                self.at.epoch += 1
                 self.at.batch = 0
         return self.at
 
     def _say(self, start: float, first: int) -> None:
-        """Print the last validation and the speed; start: when this process began (s), first: its
-        first step.
+        """Print the last validation and the speed.
+
+        start: when this process began (s); first: its first step.
         """
         if self.machine.rank:
             return
@@ -354,8 +354,9 @@ class Trainer:
         )
 
     def finish(self, extra: dict) -> None:
-        """Write `model.safetensors` (best averaged weights, `extra`) and `history.csv`, and delete
-        the checkpoint.
+        """Write `model.safetensors` and `history.csv`, and delete the checkpoint.
+
+        The model has the best averaged weights and `extra`.
         """
         if self.machine.rank:
             return

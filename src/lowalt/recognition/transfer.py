@@ -1,19 +1,19 @@
-"""Models of other runs on this run's test samples, next to this run's own: how training on other
-data changes accuracy.
+"""Models of other runs on this run's test samples, next to this run's own.
 
-Both models classify the same test samples, and their results are compared sample by sample.
+They show how training on other data changes accuracy. Both models classify the same test samples,
+and their results are compared sample by sample.
 
 transfer.csv, one row per protocol, scheme, other run and SNR ("avg": mean over SNRs):
-    trained_on                   the other run
-    accuracy_percent             of the other run's model on this run's test samples, several seeds
-    averaged own_percent                  of this run's own model
-    difference_points, low, high the other's minus this run's own, with the 95 % interval that
-    resamples training seeds,
-                                 motion models and, in the unseen protocol, subtypes
-    samples, hardware            of this run's test part
-    seeds, spread_points         training seeds of the other's model, and the standard deviation of
-    accuracy between the
-                                 seeds of a model, pooled over both models (empty for one seed)
+    trained_on          the other run
+    accuracy_percent    of the other run's model on this run's test samples, mean over its seeds
+    own_percent         of this run's own model
+    difference_points, low, high
+                        the other's minus this run's own, with the 95 % interval that resamples
+                        training seeds, motion models and, in the unseen protocol, subtypes
+    samples, hardware   of this run's test samples
+    seeds, spread_points
+                        training seeds of the other's model, and the standard deviation of accuracy
+                        between the seeds of a model, pooled over both models (empty for one seed)
 """
 
 from collections.abc import Iterable
@@ -94,14 +94,8 @@ def comparison(
         of_own = [100 * run.test.correct[rows].mean() for run in own]
         of_other = [100 * run.test.correct[rows].mean() for run in other]
         spread = spread_points(of_own, of_other)
-        yield [
-            word,
-            *numbers,
-            len(mine[rows]),
-            own[0].hardware,
-            len(other),
-            "" if spread is None else f"{spread:.4f}",
-        ]
+        spread_cell = "" if spread is None else f"{spread:.4f}"
+        yield [word, *numbers, len(mine[rows]), own[0].hardware, len(other), spread_cell]
 
 
 def write(
@@ -112,8 +106,8 @@ def write(
     Each of `other` says which run trained it.
     Raises: InputError where a model has no counterpart in this run.
     """
-    mine = {}
-    theirs = {}
+    mine: dict[tuple[str, str], list[Evaluated]] = {}
+    theirs: dict[tuple[str, str, str], list[Evaluated]] = {}
     for run in own:
         mine.setdefault((run.protocol, run.scheme), []).append(run)
     for run in other:

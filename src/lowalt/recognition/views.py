@@ -22,7 +22,7 @@ from lowalt.recognition.schemes import columns_in
 from lowalt.shards import ShardSet
 from lowalt.tiles import reduced
 
-_KEY = re.compile(r"(.+)-\d{6}-snr")
+_KEY = re.compile(r"(.+)-\d{6}-snr.*")
 
 
 def geometry(record: dict, network: Network) -> tuple[list[float], list[float]]:
@@ -47,10 +47,14 @@ def geometry(record: dict, network: Network) -> tuple[list[float], list[float]]:
         ranges.append(distance)
         towards = np.array(station.position_m[:2]) - [motion["x_m"], motion["y_m"]]
         length = float(np.hypot(*towards))
-        cosine = float(front @ towards) / length if length else 1.0
-        aspects.append(
-            math.acos(max(-1.0, min(1.0, cosine))) if math.isfinite(cosine) else math.nan
-        )
+        cosine = 1.0
+        if length:
+            cosine = float(front @ towards) / length
+        # Without a yaw the cosine is NaN, and so is the aspect.
+        aspect = math.nan
+        if math.isfinite(cosine):
+            aspect = math.acos(max(-1.0, min(1.0, cosine)))
+        aspects.append(aspect)
     return ranges, aspects
 
 
@@ -64,18 +68,17 @@ def facts_of(shards: ShardSet, numbers: np.ndarray, placed: bool = True) -> Fact
     owner = np.searchsorted(ends, numbers, side="right")
     keys = np.array([key.decode() for key in shards.keys[numbers]])
     network = Network.from_settings(shards.index["render"]["network"])
-    blank = ([math.nan] * len(network.stations), [math.nan] * len(network.stations))
+    ranges = np.full((len(numbers), len(network.stations)), math.nan)
+    aspects = ranges.copy()
     names: dict[str, str] = {}
     subtypes = []
-    places = []
-    for key, number in zip(keys, numbers, strict=True):
-        slug = _KEY.match(key)[1]
+    for sample, number in enumerate(numbers):
+        slug = _KEY.sub(r"\1", keys[sample])
         if placed or slug not in names:
             record = shards.record(number)
             names[slug] = record["subtype"]
-            places.append(geometry(record, network) if placed else blank)
-        else:
-            places.append(blank)
+        if placed:
+            ranges[sample], aspects[sample] = geometry(record, network)
         subtypes.append(names[slug])
     return Facts(
         key=keys,
@@ -85,15 +88,14 @@ def facts_of(shards: ShardSet, numbers: np.ndarray, placed: bool = True) -> Fact
         group=np.array([shards.shards[index]["group"] for index in owner]),
         fold=np.array([shards.shards[index]["fold"] for index in owner]),
         label=shards.labels[numbers],
-        range_m=np.array([place[0] for place in places]),
-        aspect_rad=np.array([place[1] for place in places]),
+        range_m=ranges,
+        aspect_rad=aspects,
     )
 
 
 @dataclass(frozen=True)
 class Reduced:
-    """Images of a whole chunk that the tiles stage has already reduced, a file of
-    `lowalt.tiles.reduced`.
+    """Images of a whole chunk that the tiles stage has reduced, a file of `lowalt.tiles.reduced`.
 
     motion: the chunk's motion table; snrs_db: the SNRs of every motion model, in the order of the
     chunk's signals.
@@ -109,21 +111,23 @@ class Reduced:
         Raises: InputError where the chunk has no such motion model or SNR, or the file does not fit
         them.
         """
-        rows = {
-            (row["subtype"], row["model"]): number
-            for number, row in enumerate(read_table(self.motion))
-        }
+        rows = {}
+        for number, row in enumerate(read_table(self.motion)):
+            rows[row["subtype"], row["model"]] = number
         levels = {snr: number for number, snr in enumerate(self.snrs_db)}
-        keys = zip(facts.subtype.tolist(), facts.model.tolist(), facts.snr_db.tolist(), strict=True)
+        names = zip(
+            facts.subtype.tolist(), facts.model.tolist(), facts.snr_db.tolist(), strict=True
+        )
+        numbers = []
         try:
-            places = [
-                rows[subtype, model] * len(levels) + levels[snr] for subtype, model, snr in keys
-            ]
+            for subtype, model, snr in names:
+                numbers.append(rows[subtype, model] * len(levels) + levels[snr])
         except KeyError as error:
             raise InputError(
                 f"{self.motion}: no motion model or SNR {error}, expected those of {self.path}"
             ) from None
-        return reduced.read(self.path, size, len(rows) * len(levels))[np.array(places, np.int64)]
+        images = reduced.read(self.path, size, len(rows) * len(levels))
+        return images[np.array(numbers, np.int64)]
 
 
 def cache_shard(
@@ -171,8 +175,7 @@ class ShardSamples(samples.Samples):
         Raises: InputError where nothing is left.
         """
         groups = sorted({group for group, _ in folds})
-        names = sorted({fold for _, fold in folds})
-        self.shards = ShardSet(index, groups, names)
+        self.shards = ShardSet(index, groups, sorted({fold for _, fold in folds}))
         self.size = size
         known = station_names(self.shards.index["render"]["network"])
         names = self.shards.spectra
@@ -201,9 +204,9 @@ class ShardSamples(samples.Samples):
         return np.stack([self.shards.images(self.numbers[number], *chosen) for number in numbers])
 
     def sha256(self) -> str:
-        """Return the SHA-256 of all that a training uses of these samples; the shards' checksums
-        represent the images.
+        """Return the SHA-256 of all that a training uses of these samples.
 
+        The shards' checksums stand for the images.
         Reading checks the shards against these. The same samples from a cache have another sum.
         """
         render = {

@@ -1,5 +1,6 @@
-"""The weights that a file brings: finite numbers that fit their network, which is built in limited
-memory.
+"""The weights that a file brings: finite numbers that fit their network.
+
+The network is built in limited memory.
 """
 
 from collections.abc import Callable, Mapping
@@ -14,8 +15,9 @@ from lowalt.machine.memory import at_most
 
 
 def refuse_unfinite(weights: Any, path: str | Path) -> None:
-    """Raise InputError naming the file where its weights are no tensors by name, or one has a NaN
-    or an infinity.
+    """Refuse weights of a file that are no tensors by name, or have a NaN or an infinity.
+
+    Raises: InputError naming the file.
     """
     if not isinstance(weights, Mapping) or not all(
         isinstance(value, torch.Tensor) for value in weights.values()
@@ -27,8 +29,9 @@ def refuse_unfinite(weights: Any, path: str | Path) -> None:
 
 
 def refuse_unfit(weights: Mapping[str, torch.Tensor], model: nn.Module, path: str | Path) -> None:
-    """Raise InputError naming the file where weights differ from those of a network in names,
-    shapes or kind.
+    """Refuse weights of a file that differ from a network's in names, shapes or kind.
+
+    Raises: InputError naming the file.
     """
     wanted = model.state_dict()
     wrong = sorted(map(str, wanted.keys() ^ weights.keys())) or [

@@ -62,8 +62,9 @@ class Inputs:
 
     @classmethod
     def read(cls, path: str | Path) -> "Inputs":
-        """Read a manifest. Raises: InputError where it is missing, no JSON, or as the constructor
-        says.
+        """Read a manifest.
+
+        Raises: InputError where it is missing, no JSON, or as the constructor says.
         """
         text = text_of(path, "manifest")
         try:
@@ -77,9 +78,7 @@ class Inputs:
         return name in self.files
 
     def own_or_kept(self, name: str) -> str | None:
-        """Return the manifest's name of this run's file, or else of the kept one; None where there
-        is neither.
-        """
+        """Return the manifest's name of this run's file, else of the kept one, else None."""
         return next((known for known in (name, f"kept_{name}") if known in self), None)
 
     def path(self, name: str) -> Path:
@@ -91,7 +90,8 @@ class Inputs:
         return self.files.get(name, [])
 
     def table(self, name: str, *columns: str) -> list[dict[str, str]]:
-        """Return the rows of the table called `name`. Raises: InputError where it lacks one of
-        `columns`.
+        """Return the rows of the table called `name`.
+
+        Raises: InputError where it lacks one of `columns`.
         """
         return read_csv(self.files[name], *columns)

@@ -1,5 +1,6 @@
-"""Rearranges rows of the run's tables by protocol, scheme and SNR for the page; no drawing, no
-HTML.
+"""Rearranges rows of the run's tables by protocol, scheme and SNR for the page.
+
+It draws nothing and writes no HTML.
 """
 
 from collections import defaultdict
@@ -7,9 +8,7 @@ from collections.abc import Iterable
 
 
 def by_scheme(rows: Iterable[dict[str, str]]) -> dict[str, dict[str, dict[str, float]]]:
-    """Return accuracy in percent as protocol -> scheme -> SNR label -> value, in the order of the
-    rows.
-    """
+    """Return accuracy in percent as protocol -> scheme -> SNR label -> value, in order."""
     result: dict = defaultdict(lambda: defaultdict(dict))
     for row in rows:
         result[row["protocol"]][row["scheme"]][row["snr_db"]] = float(row["accuracy_percent"])
@@ -27,8 +26,9 @@ def spreads(rows: Iterable[dict[str, str]]) -> dict[str, dict[str, str]]:
 
 
 def macro_f1(rows: Iterable[dict[str, str]]) -> dict[str, dict[str, str]]:
-    """Return macro F1 on average over the SNRs as protocol -> scheme -> "value (low to high)", in
-    percent.
+    """Return macro F1 in percent, averaged over the SNRs.
+
+    It is protocol -> scheme -> "value (low to high)".
 
     Tables of earlier versions have no such column; their schemes are left out.
     """
@@ -43,9 +43,7 @@ def macro_f1(rows: Iterable[dict[str, str]]) -> dict[str, dict[str, str]]:
 
 
 def confusion(rows: Iterable[dict[str, str]]) -> dict[tuple[str, str], dict[tuple[str, str], int]]:
-    """Return counts over all SNRs as (protocol, scheme) -> (true category, predicted category) ->
-    samples.
-    """
+    """Return counts over all SNRs: (protocol, scheme) -> (true category, predicted) -> samples."""
     result: dict = defaultdict(lambda: defaultdict(int))
     for row in rows:
         result[row["protocol"], row["scheme"]][row["category"], row["predicted"]] += int(

@@ -1,6 +1,4 @@
-"""Provenance of a run: revision of the code, changes of the configuration, checksums, and commands
-to repeat it.
-"""
+"""Provenance of a run: revision of the code, changes of the configuration, checksums, commands."""
 
 import hashlib
 import subprocess
@@ -19,8 +17,7 @@ COUNTED = (".py", ".smk", ".yaml")
 
 
 def revision(folder: Path = SHIPPED) -> str:
-    """Return the commit of the checkout in `folder` and how many of its tracked files differ from
-    it, or "no checkout".
+    """Return the commit of the checkout in `folder` and how many of its tracked files differ.
 
     "no checkout" if the folder is not the root of a checkout, or git is not installed.
     """
@@ -37,14 +34,16 @@ def revision(folder: Path = SHIPPED) -> str:
         ).stdout.splitlines()
     except (OSError, subprocess.CalledProcessError):
         return "no checkout"
-    files = f"{len(changed)} tracked file{'s' if len(changed) > 1 else ''}"
-    return f"{commit}, {files} changed since" if changed else commit
+    if not changed:
+        return commit
+    plural = "s" if len(changed) > 1 else ""
+    return f"{commit}, {len(changed)} tracked file{plural} changed since"
 
 
 def code_sum(folder: Path = PACKAGE) -> str:
-    """Return one SHA-256 of all source files of the package, by name and content, without using
-    version control.
+    """Return one SHA-256 of all source files of the package, by name and content.
 
+    No version control is used.
     Compiled files are excluded.
     """
     whole = hashlib.sha256()
@@ -55,8 +54,7 @@ def code_sum(folder: Path = PACKAGE) -> str:
 
 
 def changes(base: dict, config: dict) -> dict:
-    """Return the smallest overlay that turns the configuration `base` into `config` when it is laid
-    over it.
+    """Return the smallest overlay that turns the configuration `base` into `config`.
 
     A key that `config` lacks becomes null, which removes a station or a spectrum. Infinities are
     equal as numbers and as the words that stand for them in JSON; the overlay has numbers.
@@ -71,7 +69,9 @@ def _numbers(value: Any) -> Any:
         return {key: _numbers(item) for key, item in value.items()}
     if isinstance(value, list):
         return [_numbers(item) for item in value]
-    return float(value) if value in ("inf", "-inf") else value
+    if value in ("inf", "-inf"):
+        return float(value)
+    return value
 
 
 def _differing(base: dict, config: dict) -> dict:
@@ -98,7 +98,9 @@ def checksums(files: dict[str, str | list[str]]) -> list[dict]:
     paths: list[str] = []
     for name, of_name in files.items():
         if name != "benchmarks" and not name.startswith("kept_"):
-            paths += [of_name] if isinstance(of_name, str) else of_name
+            if isinstance(of_name, str):
+                of_name = [of_name]
+            paths += of_name
     return [
         {"path": path, "bytes": Path(path).stat().st_size, "sha256": sha256(path)}
         for path in dict.fromkeys(paths)

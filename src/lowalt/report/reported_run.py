@@ -10,8 +10,10 @@ class ReportedRun:
     """The run that a page shows."""
 
     def __init__(self, inputs: Inputs, config: dict, targets: dict[str, dict]) -> None:
-        """inputs: the run's files; config: its configuration; targets: row of the table of targets
-        by subtype.
+        """Take what the page of a run is made of.
+
+        inputs: the run's files; config: its configuration; targets: row of the table of targets by
+        subtype.
         """
         self.inputs = inputs
         self.config = config

@@ -14,8 +14,9 @@ COLUMNS = ("rule", "jobs", "wall_s", "cpu_s", "peak_mib", "samples", "sample_byt
 
 
 def _job(path: str | Path) -> dict:
-    """One job's measurement from Snakemake's benchmark file (JSON lines, extended; the last run
-    counts).
+    """One job's measurement from Snakemake's benchmark file, whose last run counts.
+
+    The file is extended JSON lines.
     """
     try:
         last = json.loads(text_of(path, "benchmark").splitlines()[-1])
@@ -25,8 +26,7 @@ def _job(path: str | Path) -> dict:
 
 
 def stage_times(paths: Iterable[str | Path]) -> list[dict]:
-    """Return the time and memory of each rule, from Snakemake's benchmark files (JSON lines,
-    extended).
+    """Return the time and memory of each rule, from Snakemake's benchmark files.
 
     One dict per rule: rule, jobs, wall_s and cpu_s (sums over jobs), peak_mib (largest job;
     sampled, so a short peak can be missed).
@@ -44,17 +44,15 @@ def stage_times(paths: Iterable[str | Path]) -> list[dict]:
         entry["wall_s"] += float(job["s"])
         # Jobs under Snakemake's sampling interval have no CPU or memory reading; it writes null or
         # "NA".
-        entry["cpu_s"] += float(cpu) if isinstance(cpu, (int, float)) else 0.0
-        entry["peak_mib"] = max(
-            entry["peak_mib"], float(memory) if isinstance(memory, (int, float)) else 0.0
-        )
+        if isinstance(cpu, (int, float)):
+            entry["cpu_s"] += float(cpu)
+        if isinstance(memory, (int, float)):
+            entry["peak_mib"] = max(entry["peak_mib"], float(memory))
     return list(rules.values())
 
 
 def write_stages(path: str | Path, run: ReportedRun) -> None:
-    """Write the times of the rules as CSV, with the number of samples, bytes per sample and the
-    hardware.
-    """
+    """Write the times of the rules as CSV, with samples, bytes per sample and the hardware."""
     about = len(run.shards), f"{run.sample_bytes:.0f}", describe()
     write_csv(
         path,

@@ -1,5 +1,6 @@
-"""Command line of the echo stage in a scene with effects: motion table and clouds -> signals and
-reference powers.
+"""Command line of the echo stage in a scene with effects: motion table and clouds -> signals.
+
+It also writes the reference powers.
 """
 
 import sys
@@ -18,7 +19,7 @@ from lowalt.targets.cloud import read
 
 
 def main(arguments: list[str]) -> None:
-    """Compute one chunk's signals under the scene's effects and write two array files per station."""
+    """Compute one chunk's signals under the scene's effects; write two array files per station."""
     options = parser("lowalt.scene", __doc__)
     options.add_argument("--motion", required=True, help="the chunk's motion table")
     options.add_argument(
@@ -34,7 +35,8 @@ def main(arguments: list[str]) -> None:
         "--out",
         nargs="+",
         required=True,
-        help="signals to write (.npy), one file per station: complex64 (models, N), or (models, snrs, N)",
+        help="signals to write (.npy), one file per station: complex64 (models, N), or (models, "
+        "snrs, N)",
     )
     options.add_argument(
         "--power",
@@ -49,7 +51,8 @@ def main(arguments: list[str]) -> None:
                 f"{name}: {len(files)} files, expected one for each of the stations {asked.station}"
             )
     snrs = asked.settings.pop("snr_db", None)
-    snrs = None if snrs is None else [float(snr) for snr in snrs]
+    if snrs is not None:
+        snrs = [float(snr) for snr in snrs]
     seed, block, tolerance, effects = pick(
         asked.settings, "seed", "network", "tolerance", "effects"
     )
@@ -61,10 +64,9 @@ def main(arguments: list[str]) -> None:
 
         occluders = read_all(asked.occluders)
     rows = read_table(asked.motion)
-    for station, *paths in zip(asked.station, asked.out, asked.power, strict=True):
-        for path, values in zip(
-            paths, scene_signals(scene, station, clouds, rows, occluders, snrs), strict=True
-        ):
+    for station, out, power in zip(asked.station, asked.out, asked.power, strict=True):
+        signals, powers = scene_signals(scene, station, clouds, rows, occluders, snrs)
+        for path, values in ((out, signals), (power, powers)):
             with replacing(path) as temporary:
                 np.save(temporary, values)
             print(f"{path}: {len(values)} models", file=sys.stderr)

@@ -11,8 +11,10 @@ from lowalt.numerics.portable import TANGENT, from_decibels, sine_cosine
 
 
 class Element(NamedTuple):
-    """An element: largest gain (dBi), 3 dB width (degrees), depth of back and side lobes (dB),
-    downtilt (degrees).
+    """An antenna element.
+
+    gain_dbi: largest gain; width_deg: 3 dB width; back_db: depth of back and side lobes;
+    downtilt_deg: of its boresight.
     """
 
     gain_dbi: float = 8.0
@@ -44,16 +46,22 @@ def _angle(y, x):
     z = t * t
     turn = (((((_A11 * z + _A10) * z + _A9) * z + _A8) * z + _A7) * z + _A6) * z + _A5
     turn = t * (((((turn * z + _A4) * z + _A3) * z + _A2) * z + _A1) * z + _A0)
-    turn = 0.25 * math.pi - turn if far else turn
-    turn = 0.5 * math.pi - turn if b > a else turn
-    turn = math.pi - turn if x < 0.0 else turn
-    return -turn if y < 0.0 else turn
+    if far:
+        turn = 0.25 * math.pi - turn
+    if b > a:
+        turn = 0.5 * math.pi - turn
+    if x < 0.0:
+        turn = math.pi - turn
+    if y < 0.0:
+        turn = -turn
+    return turn
 
 
 @_SCALAR
 def pattern_db(element, azimuth_deg, zenith_deg):
-    """Return the gain (dBi) at an azimuth and a zenith angle from the element's own boresight (0,
-    90).
+    """Return the gain (dBi) at an azimuth and a zenith angle.
+
+    They count from the element's own boresight at (0, 90) degrees.
 
     Source: 3GPP TR 38.901, Table 7.3-1.
     """
@@ -64,8 +72,9 @@ def pattern_db(element, azimuth_deg, zenith_deg):
 
 @LEAN
 def _gains_db(element, station, across, tilt, places, result):
-    """Fill result (N, L) with the gains (dBi) toward places (N, 3, L) m; across: the array's axis;
-    tilt: (cos, sin).
+    """Fill result (N, L) with the gains (dBi) toward places (N, 3, L) m.
+
+    across: the array's axis; tilt: (cos, sin).
     """
     degrees = 180.0 / math.pi
     for n in range(len(places)):
@@ -74,7 +83,9 @@ def _gains_db(element, station, across, tilt, places, result):
         zs = places[n, 2]
         row = result[n]
         for i in range(np.uint64(len(row))):
-            x, y, z = xs[i] - station[0], ys[i] - station[1], zs[i] - station[2]
+            x = xs[i] - station[0]
+            y = ys[i] - station[1]
+            z = zs[i] - station[2]
             front = across[1] * x - across[0] * y
             side = across[0] * x + across[1] * y
             ahead = tilt[0] * front - tilt[1] * z
@@ -89,7 +100,9 @@ def gain(element: Element, station: Station, places: np.ndarray) -> np.ndarray:
     The panel stays vertical; the downtilt turns the element's boresight.
     """
     places = np.asarray(places, np.float64)
-    points = places if places.ndim == 3 else places.reshape(1, -1, 3)
+    points = places
+    if places.ndim != 3:
+        points = places.reshape(1, -1, 3)
     sine, cosine = sine_cosine(np.radians(element.downtilt_deg))
     result = np.empty(points.shape[:2])
     _gains_db(
@@ -104,8 +117,9 @@ def gain(element: Element, station: Station, places: np.ndarray) -> np.ndarray:
 
 
 def array_sum(count: int, x: np.ndarray) -> np.ndarray:
-    """Return the sum (...) of `count` elements in a line, half a wavelength apart, counted from the
-    first.
+    """Return the sum (...) of `count` elements in a line.
+
+    They stand half a wavelength apart and are counted from the first.
 
     x: direction cosine off the beam times the frequency over the carrier, any shape.
     """

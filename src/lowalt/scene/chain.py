@@ -1,5 +1,6 @@
-"""The signal of one sample at one station of a scene: detect(receive(transmit(sum of frequency
-responses))).
+"""The signal of one sample at one station of a scene.
+
+It is detect(receive(transmit(sum of frequency responses))).
 
 The chain asks the scene's effects for functions (`contract`) and names no effect. Effects of one
 place act in the order of `effects.LISTED`. A step that no effect needs is skipped: the echo engine
@@ -44,7 +45,10 @@ class Received(NamedTuple):
 
 
 class SceneSample:
-    """One motion model as one station of a scene receives it; each method is a step of the chain."""
+    """One motion model as one station of a scene receives it.
+
+    Each method is a step of the chain.
+    """
 
     def __init__(
         self,
@@ -53,8 +57,9 @@ class SceneSample:
         clouds: Mapping[str, Cloud] | None = None,
         power: float | None = None,
     ):
-        """Take the scene, the sample's view in it (`observe`), and the clouds of all subtypes, for
-        effects that add other targets.
+        """Take the scene, the sample's view in it (`observe`), and the clouds of all subtypes.
+
+        Effects that add other targets need the clouds.
 
         power: the reference of the configuration's SNRs (W), None for the power of the target's own
         echo.
@@ -73,8 +78,7 @@ class SceneSample:
         self._factors: dict[tuple[View, str], np.ndarray] = {}
 
     def weight(self, view: View, one_sided: bool | None = None) -> np.ndarray:
-        """Return the product (N, L) of the amplitude factors that effects put on the points of a
-        view.
+        """Return the product (N, L) of the amplitude factors that effects put on a view's points.
 
         one_sided: True for the effects with ONE_SIDED alone, False for the others, None for all.
         Raises: InputError for a wrong shape.
@@ -106,9 +110,8 @@ class SceneSample:
         factors = []
         for end in view.ends():
             rng = self.scene.drawn(view.row, end.station, effect.name)
-            factors.append(
-                numbers(effect.name, "visible_one_way", visible(end, rng), shapes, real=True)
-            )
+            found = visible(end, rng)
+            factors.append(numbers(effect.name, "visible_one_way", found, shapes, real=True))
         if len(factors) == 1:
             return factors[0]
         product = factors[0] * factors[1]
@@ -120,8 +123,9 @@ class SceneSample:
         return np.sqrt(product)
 
     def paths(self, view: View) -> list[ImagePath]:
-        """Return all paths but the direct one; on a link, those of the receiver, each with the
-        sender's of its kind.
+        """Return all paths but the direct one.
+
+        On a link, they are those of the receiver, each with the sender's of its kind.
         """
         ends = []
         for end in view.ends():
@@ -137,11 +141,14 @@ class SceneSample:
         return [there._replace(sender=here) for here, there in zip_longest(*ends, fillvalue=none)]
 
     def routes(self, view: View, paths: list[ImagePath]) -> np.ndarray:
-        """Return the amplitude factor of each point, (N, L), or (R, R, N, L) where it depends on
-        the route.
+        """Return the amplitude factor of each point, (N, L).
+
+        It is (R, R, N, L) where it depends on the route.
         """
         routes = self.only("routes")
-        return routes(view, paths, self.weight) if routes and paths else self.weight(view)
+        if routes and paths:
+            return routes(view, paths, self.weight)
+        return self.weight(view)
 
     @cached_property
     def targets(self) -> list[View]:
@@ -150,24 +157,25 @@ class SceneSample:
         result = [view]
         for name, companions in self.all("companions").items():
             cloud = self.clouds.get(view.cloud.subtype, view.cloud)
-            for other, row in companions(
-                cloud, view.row, self.clouds, self.scene.stream(name, view.row)
-            ):
+            rng = self.scene.stream(name, view.row)
+            for other, row in companions(cloud, view.row, self.clouds, rng):
                 occluders = view.occluders if other is cloud else None
                 result.append(observe(self.scene, view.station, other, row, occluders, beside=view))
         return result
 
     @cached_property
     def direct(self) -> np.ndarray:
-        """The target's frequency response (N, M) on the direct path, with plane waves and no beam
-        squint.
+        """The target's frequency response (N, M) on the direct path.
+
+        Waves are plane and beams do not squint.
         """
         return response(self.view, (), self.weight(self.view))
 
     @cached_property
     def power(self) -> float:
-        """The reference of the configuration's SNRs: mean |Y_bin|^2 (W) of the target's own echo on
-        the direct path.
+        """The reference of the configuration's SNRs.
+
+        It is the mean |Y_bin|^2 (W) of the target's own echo on the direct path.
         """
         if self._power is not None:
             return self._power
@@ -176,14 +184,16 @@ class SceneSample:
         return arriving_power(cells[np.arange(len(cells)), strongest])
 
     def direct_echo(self, view: View) -> np.ndarray:
-        """Return the target's frequency response (N, M) on the direct path, with the scene's
-        physics of arrays.
+        """Return the target's frequency response (N, M) on the direct path.
+
+        Arrays have the scene's physics.
         """
         return response(view, (), self.weight(view), **self._waves)
 
     def echo(self, view: View) -> np.ndarray:
-        """Return the frequency response (N, M) on all paths of a view's target, which stands still
-        within a symbol.
+        """Return the frequency response (N, M) on all paths of a view's target.
+
+        The target stands still within a symbol.
         """
         # Most facades reflect nothing during a look, so their paths are left out. On a link, waves
         # that leave on a path may return on any other, so a path counts where either end uses it.
@@ -197,9 +207,7 @@ class SceneSample:
         return response(view, paths, self.routes(view, paths), **self._waves)
 
     def _samples(self, view: View) -> np.ndarray:
-        """Time samples (N, M) of a target that moves within symbols, or whose echo is later than
-        the cyclic prefix.
-        """
+        """Time samples (N, M) of a target that moves within symbols or beyond the prefix."""
         delays_s = np.zeros(1)
         weights = np.ones((1, self.scene.network.subcarriers))
         if instants := self.only("instants"):
@@ -218,7 +226,9 @@ class SceneSample:
         def on_air(name: str) -> np.ndarray | None:
             """The subcarriers on the air at every instant of each symbol."""
             aired = self.on_air(name)
-            return None if aired is None else np.repeat(aired, len(delays_s), axis=0)
+            if aired is None:
+                return None
+            return np.repeat(aired, len(delays_s), axis=0)
 
         samples = np.zeros((len(moved.times_s), network.subcarriers), np.complex128)
         # Points that are late by the same number of samples share one response.
@@ -226,9 +236,8 @@ class SceneSample:
             some = np.repeat(factor * (late == lost), len(delays_s), axis=-2)
             echo = response(moved, paths, some, **self._waves)
             samples += waveform.windowed(network, self.prefix_s, echo, lost, on_air)
-        return np.einsum(
-            "nqm,qm->nm", samples.reshape(len(view.times_s), len(delays_s), -1), weights
-        )
+        by_instant = samples.reshape(len(view.times_s), len(delays_s), -1)
+        return np.einsum("nqm,qm->nm", by_instant, weights)
 
     def _standing(self, still: Still) -> np.ndarray:
         """Time samples (N, M) of echoes that do not move within a symbol."""
@@ -237,40 +246,51 @@ class SceneSample:
         return waveform.transmit(still.response, self.on_air("waveform"))
 
     def arrived(self) -> np.ndarray:
-        """Return the frequency response (N, M) that the receiver measures: after its effects,
-        divided by the sent data.
+        """Return the frequency response (N, M) that the receiver measures.
+
+        It is taken after the receiver's effects and divided by the sent data.
 
         Without an effect on time samples, the responses of all echoes are added and no samples are
         made.
         """
-        from_sender = self.only("from_sender")
-        still = [from_sender(self.view)] if from_sender else []
-        shape = len(self.view.times_s), self.scene.network.subcarriers
-        for name, scatter in self.all("scatter").items():
-            found = scatter(self.view, self.draws(name))
-            still.append(found._replace(response=numbers(name, "scatter", found.response, [shape])))
-        unknown = [
-            numbers(name, "heard", heard(self), [shape])
-            for name, heard in self.all("heard").items()
-        ]
+        still = self._still()
+        unknown = []
+        shape = (len(self.view.times_s), self.scene.network.subcarriers)
+        for name, heard in self.all("heard").items():
+            unknown.append(numbers(name, "heard", heard(self), [shape]))
+        none = np.zeros(shape, np.complex128)
         if self.only("instants") or self.only("late_samples"):
-            samples = sum(map(self._standing, still), sum(map(self._samples, self.targets)))
+            samples = sum(map(self._samples, self.targets), none)
+            samples = sum(map(self._standing, still), samples)
         else:
-            total = sum((each.response for each in still), sum(map(self.echo, self.targets)))
+            total = sum(map(self.echo, self.targets), none)
+            total = sum((each.response for each in still), total)
             if not unknown and not self.all("receive") and not self.all("aired"):
                 return total
             samples = waveform.transmit(total, self.look.aired)
         samples = sum(unknown, samples)
         for name, receive in self.all("receive").items():
-            samples = numbers(
-                name, "receive", receive(samples, self.look, self.draws(name)), [samples.shape]
-            )
+            changed = receive(samples, self.look, self.draws(name))
+            samples = numbers(name, "receive", changed, [samples.shape])
         return waveform.demodulate(samples, self.look.data)
+
+    def _still(self) -> list[Still]:
+        """The echoes of all but targets: a link's direct path, and what effects scatter."""
+        result = []
+        if from_sender := self.only("from_sender"):
+            result.append(from_sender(self.view))
+        shape = (len(self.view.times_s), self.scene.network.subcarriers)
+        for name, scatter in self.all("scatter").items():
+            found = scatter(self.view, self.draws(name))
+            response = numbers(name, "scatter", found.response, [shape])
+            result.append(found._replace(response=response))
+        return result
 
     @cached_property
     def look(self) -> waveform.Look:
-        """What the receiver and the detection know of the coherent processing interval (our
-        "look").
+        """What the receiver and the detection know of the coherent processing interval.
+
+        We call the interval a look.
         """
         view = self.view
         delay_s = float(view.ways_m(view.aim_m)) / SPEED_OF_LIGHT
@@ -294,8 +314,9 @@ class SceneSample:
         return cells
 
     def chosen(self, detection: Sequence[NamedEffect], cells: np.ndarray) -> np.ndarray:
-        """Return the range cell (N,) that these detection effects choose per symbol; without any,
-        the strongest.
+        """Return the range cell (N,) that these detection effects choose per symbol.
+
+        Without any, it is the strongest.
         """
         result = abs(cells).argmax(axis=1)
         for name, choose in every(detection, "choose").items():
@@ -304,17 +325,20 @@ class SceneSample:
 
     @property
     def moves_only(self) -> bool:
-        """Whether the echo engine computes the sample: a station that sends and receives, and
-        effects that change nothing but the target's motion and its cross sections.
+        """Whether the echo engine computes the sample.
+
+        It does for a station that sends and receives, with effects that change nothing but the
+        target's motion and its cross sections.
         """
+        if self.view.station.transmitter is not None:
+            return False
         changing = [effect for effect in self.scene.effects if not effect.offers("cross_sections")]
-        return self.view.station.transmitter is None and all(
-            effect.place == "motion" for effect in changing
-        )
+        return all(effect.place == "motion" for effect in changing)
 
     def received(self) -> Received:
         """Return the sample's signal, the chosen range cells and the reference power."""
-        view, sampling = self.view, self.view.sampling
+        view = self.view
+        sampling = view.sampling
         if self.moves_only:
             echo = echo_signal(
                 self.scene.network,
@@ -338,44 +362,53 @@ class SceneSample:
         return Received(signal, chosen, self.power)
 
     def without_target(self) -> "SceneSample":
-        """Return the same sample with a target that reflects nothing; draws and noise level stay
-        the same.
+        """Return the same sample with a target that reflects nothing.
+
+        Draws and noise level stay the same.
         """
-        dark = replace(self.view.cloud, rcs_m2=np.zeros_like(self.view.cloud.rcs_m2))
+        cloud = self.view.cloud
+        dark = replace(cloud, rcs_m2=np.zeros_like(cloud.rcs_m2))
         return SceneSample(self.scene, replace(self.view, cloud=dark), self.clouds, self.power)
 
     def true_cell(self, view: View) -> np.ndarray:
-        """Return the range cell (K,) of the middle of a view's target at each received symbol: the
-        geometric truth.
+        """Return the geometric truth: the range cell (K,) of the middle of a view's target.
+
+        There is one at each received symbol.
         """
         ways_m = view.ways_m(view.places.mean(axis=1))
         cells = np.rint(ways_m / (2 * self.scene.network.cell_m)).astype(np.int64)
         return self._present(cells % self.cells.shape[1])
 
     def observed(self, view: View) -> tuple[np.ndarray, np.ndarray]:
-        """Return where the echo of the middle of a view's target appears on the direct path: the
-        range cell (K,), with its fraction, at each received symbol, and the folded speed (N,) m/s
-        at each symbol."""
-        displacements = [
-            displaced(view, self.draws(name)) for name, displaced in self.all("displaced").items()
-        ]
+        """Return where the echo of the middle of a view's target appears on the direct path.
+
+        The result is the range cell (K,), with its fraction, at each received symbol, and the
+        folded speed (N,) m/s at each symbol.
+        """
+        displacements = []
+        for name, displaced in self.all("displaced").items():
+            displacements.append(displaced(view, self.draws(name)))
         cell, speed_mps = truth.observed(view, displacements, self.cells.shape[1])
         return self._present(cell), speed_mps
 
     def observed_cell(self, view: View) -> np.ndarray:
-        """Return the range cell (K,) nearest to where the echo of a view's target appears at each
-        received symbol.
+        """Return the range cell (K,) nearest to where the echo of a view's target appears.
+
+        There is one at each received symbol.
         """
         return np.rint(self.observed(view)[0]).astype(np.int64) % self.cells.shape[1]
 
     def _present(self, symbols: np.ndarray) -> np.ndarray:
         """The received ones of N symbols, (N, ...) to (K, ...)."""
-        return symbols if self.view.sampling is None else symbols[self.view.sampling.present]
+        if self.view.sampling is None:
+            return symbols
+        return symbols[self.view.sampling.present]
 
     @property
     def prefix_s(self) -> float:
-        """The length of the cyclic prefix (s): NR's normal prefix, or the length that an effect
-        states.
+        """The length of the cyclic prefix (s).
+
+        It is that of NR's normal prefix, or the length that an effect states.
         """
         prefix_s = self.only("prefix_s") or partial(waveform.prefix_length_s, None)
         return prefix_s(self.scene.network)
@@ -387,8 +420,9 @@ class SceneSample:
         return f"{row['subtype']}, model {row['model']}, station {self.view.station.name}"
 
     def _data(self, name: str) -> np.ndarray | None:
-        """The data (N, M) that the random stream of this name gives, QPSK by default; None for
-        waveforms but OFDM.
+        """The data (N, M) that the random stream of this name gives, QPSK by default.
+
+        They are None for waveforms but OFDM.
         """
         network = self.scene.network
         if network.waveform != "ofdm":
@@ -415,14 +449,14 @@ def received_signal(
     station: Station,
     cloud: Cloud,
     row: dict,
-    occluders: Mapping[str, dict] | None = None,
+    occluders: dict | None = None,
     clouds: Mapping[str, Cloud] | None = None,
 ) -> Received:
-    """Return the signal of the motion model `row` (motion table) at `station`, with the scene's
-    effects.
+    """Return the signal of a motion model at `station`, with the scene's effects.
 
-    occluders: the target's surfaces, where an effect needs them; clouds: the clouds of all
-    subtypes, for effects that add other targets.
+    row: of the motion table; occluders: the target's surfaces, where an effect needs them;
+    clouds: the clouds of all subtypes, for effects that add other targets.
+
     Raises: InputError naming the sample that cannot be computed.
     """
     return SceneSample(scene, observe(scene, station, cloud, row, occluders), clouds).received()
@@ -436,17 +470,20 @@ def scene_signals(
     occluders: Mapping[str, dict] | None = None,
     snrs: list[float] | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return signals (models, N) complex64 at the station `name` and reference powers (models,) W
-    of the motion table.
+    """Return signals (models, N) complex64 at a station, and reference powers (models,) W.
 
-    clouds: by subtype, those of other targets included; occluders: each subtype's surfaces, where an
-    effect needs them; snrs (dB): given if the scene itself adds noise at set SNRs; the result has one
-    signal per SNR, (models, snrs, N).
-    Raises: InputError naming the sample whose subtype has no cloud, or that cannot be computed.
+    name: of the station; rows: of the motion table.
+
+    clouds: by subtype, those of other targets included; occluders: each subtype's surfaces, where
+    an effect needs them; snrs (dB): given if the scene itself adds noise at set SNRs; the result
+    has one signal per SNR, (models, snrs, N). Raises: InputError naming the sample whose subtype
+    has no cloud, or that cannot be computed.
     """
     station = scene.network.station(name)
     occluders = occluders or {}
-    levels = [scene] if snrs is None else [scene.at_snr(snr) for snr in snrs]
+    levels = [scene]
+    if snrs is not None:
+        levels = [scene.at_snr(snr) for snr in snrs]
     result = np.empty((len(rows), len(levels), scene.network.symbols), np.complex64)
     power = np.empty(len(rows))
     for index, row in enumerate(reported(rows, len(rows), "models")):
@@ -456,12 +493,15 @@ def scene_signals(
             received = received_signal(level, station, cloud, row, surfaces, clouds)
             result[index, number] = received.signal
             power[index] = received.power
-    return result[:, 0] if snrs is None else result, power
+    if snrs is None:
+        return result[:, 0], power
+    return result, power
 
 
 def arriving_power(signal: np.ndarray) -> float:
-    """Return the mean |Y_bin|^2 (W) of a signal (N,) that is rounded to complex64, as the echo
-    stage rounds it.
+    """Return the mean |Y_bin|^2 (W) of a signal (N,) that is rounded to complex64.
+
+    The echo stage rounds it so.
 
     Without this rounding, the noise level of a scene without effects would differ from that of the
     noise stage.

@@ -1,5 +1,6 @@
-"""Checks of a scene before any job starts: whether its effects fit its network, its noise and each
-other.
+"""Checks of a scene before any job starts.
+
+They say whether its effects fit its network, its noise and each other.
 """
 
 from collections.abc import Collection, Mapping
@@ -68,8 +69,7 @@ def check(config: dict, all_cells: bool = False) -> CheckedScene:
     if scene.noisy and coloured and config.get("shards", {}).get("kind") == "recipe":
         raise InputError(
             "shards.kind: 'recipe' draws white noise as samples are read, expected 'image' or "
-            "'signal' in a scene with "
-            f"effects {coloured}"
+            f"'signal' in a scene with effects {coloured}"
         )
     for effect in effects:
         if hasattr(effect.module, "check"):
@@ -100,16 +100,12 @@ def refuse_unknown_subtypes(effects: dict, subtypes: Collection[str]) -> None:
 
 
 def refuse_missing(network: Network, named: Collection[ModuleType]) -> None:
-    """Raise InputError where none of the named effects, idle ones included, offers what the
-    network's signals need.
-    """
+    """Raise InputError where no named effect, idle ones included, offers what the network needs."""
     links = links_of(network)
     guard = network.guard_subcarriers
-    needed = (
-        {"from_sender": f"network.stations: {links} are links between two stations"}
-        if links
-        else {}
-    )
+    needed = {}
+    if links:
+        needed["from_sender"] = f"network.stations: {links} are links between two stations"
     if guard < 0:
         needed["heard"] = f"network.guard_subcarriers: {guard}, sub-bands overlap"
     for function, said in needed.items():
@@ -126,12 +122,12 @@ def links_of(network: Network) -> list[str]:
 
 
 def refuse_unmodelled(network: Network, modules: Mapping[str, ModuleType]) -> None:
-    """Raise InputError for effects, modules by name, that are not modelled with the network's
-    waveform or links.
+    """Raise InputError for effects, modules by name, that are not modelled.
+
+    They do not go with the network's waveform or links.
     """
-    cases = {
-        network.waveform: f"with network.waveform of kind {network.waveform!r}, expected none of them"
-    }
+    kind = network.waveform
+    cases = {kind: f"with network.waveform of kind {kind!r}, expected none of them"}
     if links := links_of(network):
         cases["links"] = (
             f"between two stations, expected none of them in a network with the links {links}"
@@ -149,6 +145,6 @@ def above_ground(effect: str, network: Network) -> None:
     for station in network.stations:
         if station.position_m[2] <= 0:
             raise InputError(
-                f"effects.{effect}: station {station.name} stands at z = {station.position_m[2]} m, expected above the "
-                "ground z = 0"
+                f"effects.{effect}: station {station.name} stands at z = {station.position_m[2]} "
+                "m, expected above the ground z = 0"
             )

@@ -1,5 +1,6 @@
-"""The contract of effects: the functions that an effect may offer, each with its place, arguments,
-result and owners.
+"""The contract of effects: the functions that an effect may offer.
+
+Each has its place, arguments, result and owners.
 
 An effect is a module `effects/PLACE/NAME.py`, or a file of the user's own that a configuration
 names by its path. It defines SOURCE, where its law comes from; DEFAULTS, every parameter with its
@@ -56,7 +57,8 @@ ARGUMENTS = {
     "cloud": "`Cloud` of the target",
     "clouds": "clouds of all subtypes by name",
     "network": "`Network`",
-    "on_air": "function of a symbol's name, see `SceneSample.on_air`, that returns its subcarriers (N, M) on the air",
+    "on_air": "function of a symbol's name, see `SceneSample.on_air`, that returns its subcarriers "
+    "(N, M) on the air",
     "look": "`Look`, what the receiver knows",
     "offset_cells": "distance of still echoes beyond the centres of their range cells, in cells",
     "paths": "list of P `ImagePath`, the direct path not among them",
@@ -72,8 +74,8 @@ ARGUMENTS = {
     "timing": "`Sampling`",
     "view": "`View` of the target at the station",
     "wavelength_m": "wavelength of the carrier (m)",
-    "weight": "`SceneSample.weight`, the product of the amplitude factors of all effects, of those with "
-    "ONE_SIDED, or of the others",
+    "weight": "`SceneSample.weight`, the product of the amplitude factors of all effects, of those "
+    "with ONE_SIDED, or of the others",
 }
 """What functions take, with shapes and units."""
 
@@ -91,8 +93,12 @@ def numbers(
         raise InputError(
             f"{name}: {function} gives an array of shape {found.shape}, expected {shapes[0]}"
         )
-    if found.dtype.kind not in ("biuf" if real else "biufc"):
-        kind = "real numbers" if real else "numbers"
+    allowed = "biufc"
+    kind = "numbers"
+    if real:
+        allowed = "biuf"
+        kind = "real numbers"
+    if found.dtype.kind not in allowed:
         raise InputError(f"{name}: {function} gives an array of {found.dtype}, expected {kind}")
     if not np.isfinite(found).all():
         raise InputError(f"{name}: {function} gives NaN or infinity, expected finite numbers")
@@ -228,8 +234,8 @@ OFFERS = {
         "",
         MANY,
         ("network", "row", "rng"),
-        "fields that it adds to the record of a sample, by name, alike for all SNRs; numbers, texts, "
-        "lists and dicts that JSON holds",
+        "fields that it adds to the record of a sample, by name, alike for all SNRs; numbers, "
+        "texts, lists and dicts that JSON holds",
     ),
     "choose": Offer(
         "detection", MANY, ("chosen", "cells", "look", "rng"), "(N,) chosen range cells"

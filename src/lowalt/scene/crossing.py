@@ -1,5 +1,6 @@
-"""The way from one station's mast to another's, by both arrays' side lobes while their beams point
-at the target.
+"""The way from one station's mast to another's, by the side lobes of both arrays.
+
+Their beams point at the target.
 """
 
 import numpy as np
@@ -12,23 +13,19 @@ from lowalt.scene.view import View
 
 
 def crossing(view: View, sends: Station, hears: Station) -> tuple[np.ndarray, float]:
-    """Return the free-space response (M,) from mast to mast on the subcarriers of `hears`, and its
-    delay (s).
+    """Return the free-space response (M,) from mast to mast, and its delay (s).
+
+    The response is that on the subcarriers of `hears`.
 
     Each station's beam points as in `view`; sends: with the frequency of `hears`. The response is
-    in the units of the
-    echo: the amplitude is sqrt(P / elements) lambda / (4 pi d) times both array sums. Source: Friis
-    1946.
+    in the units of the echo: the amplitude is sqrt(P / elements) lambda / (4 pi d) times both array
+    sums. Source: Friis 1946.
     """
     network = view.network
     distance = float(norm(np.asarray(hears.position_m) - np.asarray(sends.position_m)))
     elements = np.prod(network.transmit) * np.prod(network.receive)
-    level = (
-        np.sqrt(network.power / elements)
-        * SPEED_OF_LIGHT
-        / network.carrier_hz
-        / (4 * np.pi * distance)
-    )
+    level = np.sqrt(network.power / elements) * SPEED_OF_LIGHT / network.carrier_hz
+    level = level / (4 * np.pi * distance)
     for station, other, counts in (
         (sends, hears, network.transmit),
         (hears, sends, network.receive),
@@ -42,8 +39,9 @@ def crossing(view: View, sends: Station, hears: Station) -> tuple[np.ndarray, fl
 
 
 def toward(view: View, station: Station, counts: tuple[int, int], places: np.ndarray) -> np.ndarray:
-    """Return the sum (...) over `counts` elements of a station, steered as in `view`, toward places
-    (..., 3) m.
+    """Return the sum (...) over a station's elements toward places (..., 3) m.
+
+    The array is steered as in `view`. counts: of the elements, across and up.
     """
     off = (cosines(station, places) - cosines(station, view.aim_of(station))) * station.frequency_hz
     off = off / view.network.carrier_hz

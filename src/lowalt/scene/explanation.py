@@ -1,5 +1,6 @@
-"""What a scene does to the signals of a few samples: whether the target's cell is found, and what
-each effect changes.
+"""What a scene does to the signals of a few samples.
+
+It says whether the target's cell is found, and what each effect changes.
 
 An effect is priced by leaving it out of the scene, or by adding it with its defaults where the
 scene does not name it. `commands.explain` prints it all. It passes in a function that says what a
@@ -41,8 +42,8 @@ VISIBLE = 8
 """A pixel, 0 to 255, counts as changed if it changes by more than this."""
 FOUND = 0.9
 """A target counts as found if the range cell is right in at least this share of the symbols."""
-
-
+BETTER = 0.05
+"""Another detection is named if its share of right cells is larger by more than this."""
 MOST_RATIO = 10
 """A change that is larger than this multiple of the signal is written in dB."""
 
@@ -81,11 +82,11 @@ class Change(NamedTuple):
 
     signal: root mean square of the signal's change over the signal's, the mean over samples and
     stations; by_class: the same of each class; cells: share of symbols with another range cell,
-    modulo the smaller number of cells where the effect changes that number;
-    more: share of the pixels, or of a network's answers, that differ; ms: processor time of the
-    effect per sample and station, a median; spread_ms: standard deviation of that time over samples
-    and stations; also: a further change without which the scene would be refused; refused: why the
-    effect was not tried; part: the part of the effect that was left out, "" for the whole.
+    modulo the smaller number of cells where the effect changes that number; more: share of the
+    pixels, or of a network's answers, that differ; ms: processor time of the effect per sample and
+    station, a median; spread_ms: standard deviation of that time over samples and stations; also: a
+    further change without which the scene would be refused; refused: why the effect was not tried;
+    part: the part of the effect that was left out, "" for the whole.
     """
 
     effect: str
@@ -105,8 +106,9 @@ class Change(NamedTuple):
 def samples(
     config: dict, inputs: Path | None, asked: list[tuple[str, int]]
 ) -> list[ExplainedSample]:
-    """Return the motion models `asked` for (subtype, number), or the first model of each category's
-    first subtype.
+    """Return the motion models `asked` for, by subtype and number.
+
+    Where none is asked for, it is the first model of each category's first subtype.
 
     Clouds and motion are made as the workflow makes them, so a sample is the one the data set
     holds.
@@ -132,23 +134,23 @@ def samples(
         record = records[name]
         cloud = make(record, inputs, config["seed"])
         track, look = divmod(model, motion.get("looks", 1))
-        row = model_rows(
-            config["seed"], cloud, record["published"], masts, corners, motion, track, path
-        )[look]
+        published = record["published"]
+        rows = model_rows(config["seed"], cloud, published, masts, corners, motion, track, path)
+        row = rows[look] | {"group": published["unseen_protocol"], "model": model}
         try:
             surfaces = occluders.make(record, inputs, config["seed"]) | {"subtype": name}
         except InputError:
             # A target without surfaces is refused where the scene, or a trial, hides points behind
             # them.
             surfaces = None
-        row = {**row, "group": record["published"]["unseen_protocol"], "model": model}
         result.append(ExplainedSample(cloud, row, surfaces))
     return result
 
 
 def scene_of(config: dict) -> Scene:
-    """Return the checked scene of a whole configuration, with noise at its middle SNR where the
-    effects add that.
+    """Return the checked scene of a whole configuration.
+
+    Where its effects add noise, it is that at the middle SNR.
 
     Raises: InputError where effects contradict each other.
     """
@@ -156,9 +158,9 @@ def scene_of(config: dict) -> Scene:
     network = Network.from_settings(config["network"])
     effects = tuple(called(config["effects"]))
     snrs = sorted(float(snr) for snr in config["noise"]["snr_db"])
-    return Scene(network, config["seed"], config["echo"]["tolerance"], effects).at_snr(
-        snrs[(len(snrs) - 1) // 2]
-    )
+    middle = snrs[(len(snrs) - 1) // 2]
+    scene = Scene(network, config["seed"], config["echo"]["tolerance"], effects)
+    return scene.at_snr(middle)
 
 
 def finding(
@@ -168,8 +170,9 @@ def finding(
     clouds: dict[str, Cloud],
     listed: bool = False,
 ) -> Finding:
-    """Return whether a sample's target is found at a station, how loud it is against all else, and
-    its levels if asked.
+    """Return what is found of a sample's target at a station.
+
+    That is whether it is found, how loud it is against all else, and its levels if asked.
 
     listed: whether levels are wanted, which take as long as a sample.
     """
@@ -181,32 +184,36 @@ def finding(
     background = empty.filtered(sample.detection)
     at_target = (received - background)[np.arange(len(target_cell)), target_cell]
     loudest = float((abs(background) ** 2).mean(axis=0).max())
-    with np.errstate(divide="ignore"):
-        over_db = 10 * np.log10(np.mean(abs(at_target) ** 2) / loudest) if loudest > 0 else np.inf
-    otherwise = {
-        label: _right(sample, detection, target_cell)
-        for label, detection in _other_detections(sample.detection).items()
-    }
+    over_db = np.inf
+    if loudest > 0:
+        with np.errstate(divide="ignore"):
+            over_db = 10 * np.log10(np.mean(abs(at_target) ** 2) / loudest)
+    otherwise = {}
+    for label, detection in _other_detections(sample.detection).items():
+        otherwise[label] = _right(sample, detection, target_cell)
     view = sample.view
-    range_m = float(np.linalg.norm(view.aim_m - np.asarray(station.position_m)))
-    radial_mps = float(geometric(view)[:, 1].mean())
+    lines = []
+    if listed:
+        lines = levels(view, scene.effects, sample.power)
     return Finding(
-        row["category"],
-        row["subtype"],
-        row["model"],
-        station.name,
-        range_m,
-        radial_mps,
-        _right(sample, sample.detection, target_cell),
-        float(over_db),
-        otherwise,
-        levels(sample.view, scene.effects, sample.power) if listed else [],
+        category=row["category"],
+        subtype=row["subtype"],
+        model=row["model"],
+        station=station.name,
+        range_m=float(np.linalg.norm(view.aim_m - np.asarray(station.position_m))),
+        radial_mps=float(geometric(view)[:, 1].mean()),
+        right=_right(sample, sample.detection, target_cell),
+        over_db=float(over_db),
+        otherwise=otherwise,
+        levels=lines,
     )
 
 
 def _other_detections(detection: list[NamedEffect]) -> dict[str, list[NamedEffect]]:
-    """Other detections than a scene's, by label: the kinds of its effects (KINDS), without and with
-    each effect of the place that it does not name and that is worth a trial (TRIED).
+    """Return other detections than a scene's, by label.
+
+    They are the kinds of its effects (KINDS), without and with each effect of the place that it
+    does not name and that is worth a trial (TRIED).
     """
     kinds = {}
     for number, effect in enumerate(detection):
@@ -217,22 +224,29 @@ def _other_detections(detection: list[NamedEffect]) -> dict[str, list[NamedEffec
     named = {effect.name for effect in detection}
     unnamed = [name for name, place in PLACES.items() if place == "detection" and name not in named]
     tried = [name for name in unnamed if hasattr(module_of(name), "TRIED")]
-    result = {}
-    for label, effects in (kinds or {"": detection}).items():
-        result[label or "the same"] = effects
+    if not kinds:
+        result = {"the same": detection}
         for name in tried:
-            result[f"{label} and {name}" if label else name] = effects + called({name: {}})
+            result[name] = detection + called({name: {}})
+        return result
+    result = {}
+    for label, effects in kinds.items():
+        result[label] = effects
+        for name in tried:
+            result[f"{label} and {name}"] = effects + called({name: {}})
     return result
 
 
 def _right(sample: SceneSample, detection: Sequence[NamedEffect], target_cell: np.ndarray) -> float:
-    """Share of symbols whose chosen cell is close to the target's, cells wrapping around as ranges
-    do.
+    """Share of symbols whose chosen cell is close to the target's.
+
+    Cells wrap around as ranges do.
     """
     acting = [effect for effect in detection if not effect.idle]
     cells = sample.filtered(acting)
     off = abs(sample.chosen(acting, cells) - target_cell)
-    return float(np.mean(np.minimum(off, cells.shape[1] - off) <= CLOSE_CELLS))
+    off = np.minimum(off, cells.shape[1] - off)
+    return float(np.mean(off <= CLOSE_CELLS))
 
 
 def changes(
@@ -241,8 +255,9 @@ def changes(
     station_names: Sequence[str],
     shown: Callable[[np.ndarray], dict[str, np.ndarray]],
 ) -> list[Change]:
-    """Return what each effect changes at some stations; the effects that the scene names come
-    first.
+    """Return what each effect changes at some stations.
+
+    The effects that the scene names come first.
 
     shown: turns the signals (K, stations, N) of all samples into what is compared, by name: pixels
     of images, answers of a network.
@@ -257,16 +272,14 @@ def changes(
     classes = np.array([explained.row["category"] for explained in chosen])
     before = shown(signals)
     result = []
-    parts = [(name, part) for name in named for part in getattr(module_of(name), "PARTS", {})]
-    others = [name for name in PLACES if name not in config["effects"]]
-    tried = [(name, "") for name in named] + parts + [(name, "") for name in others]
+    tried = _tried(config, named)
     for name, part in reported(tried, len(tried), "effects"):
         place = places.get(name) or PLACES[name]
         inside = name in named
+        also = ""
         try:
             if part:
                 changed = _without_part(config, name, part)
-                also = ""
             else:
                 changed, also = _changed(config, name)
             new_signals, new_cells, new_times_ms = _received(changed, station_names, chosen, passes)
@@ -274,8 +287,9 @@ def changes(
             result.append(Change(name, place, inside, refused=str(error)))
             continue
         moved = np.linalg.norm(new_signals - signals, axis=2) / np.linalg.norm(signals, axis=2)
-        added_ms = new_times_ms - times_ms
-        cost_ms = -added_ms if inside else added_ms
+        cost_ms = new_times_ms - times_ms
+        if inside:
+            cost_ms = -cost_ms
         fewest = min(count, _cell_count(scene_of(changed)))
         other_cell = _folded(cells, fewest) != _folded(new_cells, fewest)
         by_class = {str(kind): float(moved[classes == kind].mean()) for kind in np.unique(classes)}
@@ -298,8 +312,20 @@ def changes(
     return result
 
 
+def _tried(config: dict, named: list[str]) -> list[tuple[str, str]]:
+    """What is changed in turn: an effect, and its component that is left out, "" for the whole."""
+    result = [(name, "") for name in named]
+    for name in named:
+        result += [(name, part) for part in getattr(module_of(name), "PARTS", {})]
+    result += [(name, "") for name in PLACES if name not in config["effects"]]
+    return result
+
+
 def _cell_count(scene: Scene) -> int:
-    """The number of range cells of a scene's receiver; combs of pilots have fewer than subcarriers."""
+    """The number of range cells of a scene's receiver.
+
+    Combs of pilots have fewer than subcarriers.
+    """
     subcarriers = scene.network.subcarriers
     range_cells = only(scene.effects, "range_cells")
     if range_cells is None:
@@ -320,13 +346,16 @@ def _without_part(config: dict, name: str, part: str) -> dict:
 
 def _differing(before: np.ndarray, after: np.ndarray) -> float:
     """Share of entries that differ: numbers by more than VISIBLE, texts at all."""
-    differs = abs(before - after) > VISIBLE if before.dtype.kind == "i" else before != after
+    differs = before != after
+    if before.dtype.kind == "i":
+        differs = abs(before - after) > VISIBLE
     return float(np.mean(differs))
 
 
 def _changed(config: dict, name: str) -> tuple[dict, str]:
-    """The configuration without an effect that it names, or with one that it does not, and the
-    further change needed.
+    """Return the configuration with an effect taken out or added, and what else had to change.
+
+    An effect that the configuration names is taken out, any other is added.
 
     Raises: InputError where no single further change makes the scene fit.
     """
@@ -356,8 +385,10 @@ def _changed(config: dict, name: str) -> tuple[dict, str]:
 def _received(
     config: dict, station_names: Sequence[str], chosen: list[ExplainedSample], passes: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Signals and cells (K, stations, N) of the chosen samples, and the processor times (K,
-    stations) ms of the last pass."""
+    """Return signals and cells (K, stations, N) of the chosen samples, and their times.
+
+    The times (K, stations) ms are the processor's in the last pass.
+    """
     scene = scene_of(config)
     clouds = {explained.cloud.subtype: explained.cloud for explained in chosen}
     for _ in range(passes):
@@ -365,9 +396,8 @@ def _received(
         times_s = [time.process_time()]
         for explained in chosen:
             for name in station_names:
-                received.append(
-                    received_signal(scene, scene.network.station(name), *explained, clouds)
-                )
+                station = scene.network.station(name)
+                received.append(received_signal(scene, station, *explained, clouds))
                 times_s.append(time.process_time())
     shape = (len(chosen), len(station_names))
     signals = np.array([result.signal for result in received]).reshape(*shape, -1)
@@ -376,45 +406,45 @@ def _received(
 
 
 def verdict(findings: Sequence[Finding]) -> list[str]:
-    """Return sentences that say whether the receiver finds its targets, and what would find more of
-    them.
+    """Return sentences that say whether the receiver finds its targets.
+
+    They also say what would find more of them.
     """
+    of_class: dict[str, list[Finding]] = {}
+    for finding in findings:
+        of_class.setdefault(finding.category, []).append(finding)
     share = fmean([finding.right for finding in findings])
-    classes = list(dict.fromkeys(finding.category for finding in findings))
-    of_class = {
-        name: [finding for finding in findings if finding.category == name] for name in classes
-    }
-    shares = ", ".join(
-        f"{name} {fmean([finding.right for finding in mine]):.0%}"
-        for name, mine in of_class.items()
-    )
+    shares = []
+    over = []
+    compared = False
+    for name, mine in of_class.items():
+        shares.append(f"{name} {fmean([finding.right for finding in mine]):.0%}")
+        over_db = fmean([finding.over_db for finding in mine])
+        side = "above" if over_db >= 0 else "below"
+        over.append(f"{name} {abs(over_db):.1f} dB {side}")
+        compared |= math.isfinite(over_db)
     lines = [
-        f"The target's range cell, or one next to it, is chosen in {share:.0%} of the symbols: {shares}."
+        f"The target's range cell, or one next to it, is chosen in {share:.0%} of the symbols: "
+        f"{', '.join(shares)}."
     ]
-    over_db = {
-        name: fmean([finding.over_db for finding in mine]) for name, mine in of_class.items()
-    }
-    if any(math.isfinite(level) for level in over_db.values()):
-        texts = (
-            f"{name} {abs(level):.1f} dB {'above' if level >= 0 else 'below'}"
-            for name, level in over_db.items()
-        )
+    if compared:
         lines.append(
-            f"Behind the filters the target is, against the loudest cell of all else: {', '.join(texts)} it."
+            "Behind the filters the target is, against the loudest cell of all else: "
+            f"{', '.join(over)} it."
         )
-    better = {
-        name: fmean([finding.otherwise[name] for finding in findings])
-        for name in findings[0].otherwise
-    }
+    better = {}
+    for name in findings[0].otherwise:
+        better[name] = fmean([finding.otherwise[name] for finding in findings])
     best = max(better, key=better.__getitem__)
-    if share < FOUND and better[best] > share + 0.05:
+    if share < FOUND and better[best] > share + BETTER:
         lines.append(f"With {best} it would be {better[best]:.0%}.")
     return lines
 
 
 def effects_table(changes: Sequence[Change], sources: bool) -> list[str]:
-    """Return one line per effect: by how much it changes signals, range cells and images, and its
-    time.
+    """Return one line per effect: by how much it changes signals, range cells and images.
+
+    The line also states the effect's time.
     """
     more = list(dict.fromkeys(key for change in changes for key in change.more))
     columns = "".join(f"{key:>9}" for key in more)
@@ -425,18 +455,18 @@ def effects_table(changes: Sequence[Change], sources: bool) -> list[str]:
             lines.append(f"{head}not tried: {change.refused}")
             continue
         shares = "".join(f"{change.more.get(key, math.nan):>9.1%}" for key in more)
-        cells = f"{_signal_text(change):>16} {change.cells:>7.1%} {shares}{cost_text(change.ms, change.spread_ms):>9}"
-        lines.append(
-            f"{head}{cells}  {change.also}{f'its {change.part} left out' * bool(change.part)}".rstrip()
-        )
+        cost = cost_text(change.ms, change.spread_ms)
+        cells = f"{_signal_text(change):>16} {change.cells:>7.1%} {shares}{cost:>9}"
+        remark = change.also
+        if change.part:
+            remark += f"its {change.part} left out"
+        lines.append(f"{head}{cells}  {remark}".rstrip())
     lines.append(
         "named: without it; added: with it and its defaults. Shares of the signal's rms, of "
-        "symbols, of pixels; "
-        "x: the change over the signal, from the least to the most changed class, where it exceeds "
-        "the signal in one; "
-        "dB: how much the effect weakens (-) or strengthens (+) the signal, over the classes, where "
-        "one changes more than tenfold; "
-        "<: a time that the measurement cannot tell from zero."
+        "symbols, of pixels; x: the change over the signal, from the least to the most changed "
+        "class, where it exceeds the signal in one; dB: how much the effect weakens (-) or "
+        "strengthens (+) the signal, over the classes, where one changes more than tenfold; <: a "
+        "time that the measurement cannot tell from zero."
     )
     if sources:
         lines += [
@@ -450,59 +480,73 @@ def effects_table(changes: Sequence[Change], sources: bool) -> list[str]:
 def _signal_text(change: Change) -> str:
     """The change of the signal as a share of it, else the range of its ratio over the classes.
 
-    It is a share up to 100 % in every class, a ratio with an x up to tenfold, and beyond that, where
-    an effect hides or drowns nearly all of a signal, in dB.
+    It is a share up to 100 % in every class, a ratio with an x up to tenfold, and beyond that,
+    where an effect hides or drowns nearly all of a signal, in dB.
     """
     ratios = sorted(change.by_class.values()) or [change.signal]
     largest = ratios[-1]
     if largest <= 1:
         return f"{change.signal:.1%}"
     if largest <= MOST_RATIO:
-        ends = [f"x{ratio:.2g}" for ratio in ratios]
+        texts = [f"x{ratio:.2g}" for ratio in ratios]
         unit = ""
     else:
-        sign = -1 if change.named else 1
-        levels = [sign * 20 * math.log10(ratio) if ratio > 0 else -math.inf for ratio in ratios]
-        ends = [f"{level:+.0f}" for level in sorted(levels)]
+        levels_db = []
+        for ratio in ratios:
+            level_db = -math.inf
+            if ratio > 0:
+                level_db = 20 * math.log10(ratio)
+                if change.named:
+                    level_db = -level_db
+            levels_db.append(level_db)
+        texts = [f"{level_db:+.0f}" for level_db in sorted(levels_db)]
         unit = " dB"
-    if ends[0] == ends[-1]:
-        return ends[0] + unit
-    return f"{ends[0]} to {ends[-1]}{unit}"
+    least = texts[0]
+    most = texts[-1]
+    if least == most:
+        return f"{least}{unit}"
+    return f"{least} to {most}{unit}"
 
 
 def cost_text(ms: float, spread_ms: float) -> str:
-    """Return a cost in ms; if it is negative or below its spread, the larger of both magnitudes
-    behind a `<`.
+    """Return a cost in ms.
+
+    If it is negative or below its spread, it is the larger of both magnitudes behind a `<`.
     """
-    return f"{ms:.1f}" if ms > spread_ms else f"<{max(spread_ms, -ms):.1f}"
+    if ms > spread_ms:
+        return f"{ms:.1f}"
+    return f"<{max(spread_ms, -ms):.1f}"
 
 
 def suggested(overlay: dict, changes: Sequence[Change], least: float) -> str:
-    """Return a scene as YAML with those of its effects that change a signal by more than `least`,
-    each with its share.
+    """Return a scene as YAML with those of its effects that change a signal.
+
+    The change must be more than `least`; each effect has its share.
 
     overlay: the scene's own blocks.
     """
     others = {key: value for key, value in overlay.items() if key != "effects"}
-    lines = [yaml.safe_dump(others, sort_keys=False).rstrip()] if others else []
-    kept = [
-        change
-        for change in changes
-        if change.named and not change.part and not change.signal <= least
-    ]
+    lines = []
+    if others:
+        lines.append(yaml.safe_dump(others, sort_keys=False).rstrip())
+    whole = [change for change in changes if change.named and not change.part]
+    kept = [change for change in whole if not change.signal <= least]
     lines.append(
-        f"# Effects that change a signal by more than {least:g} of its root mean square, and by how much."
+        f"# Effects that change a signal by more than {least:g} of its root mean square, and by "
+        "how much."
     )
     lines.append("effects:" if kept else "effects: {}")
     for change in kept:
-        block = yaml.safe_dump(
-            overlay["effects"][change.effect] or {}, default_flow_style=True, width=1000
-        )
+        settings = overlay["effects"][change.effect] or {}
+        block = yaml.safe_dump(settings, default_flow_style=True, width=1000)
         lines.append(f"  {change.effect}: {block.strip()}  # {change.signal:.2g}")
     return "\n".join(lines) + "\n"
 
 
 def level_lines(finding: Finding) -> list[str]:
     """Return the levels of one sample at one station as a link budget lists them."""
-    head = f"{finding.subtype}, model {finding.model}, station {finding.station}, range {finding.range_m:.0f} m"
+    head = (
+        f"{finding.subtype}, model {finding.model}, station {finding.station}, range "
+        f"{finding.range_m:.0f} m"
+    )
     return [head, *(f"  {line}" for line in table(finding.levels))]

@@ -21,5 +21,7 @@ def fresnel(
     """
     epsilon = permittivity - 1j * conductivity_s_m / (2 * np.pi * frequency_hz * VACUUM_F_M)
     inside = np.sqrt(epsilon - 1.0 + sine * sine)
-    outside = sine * (epsilon if polarisation == "vertical" else 1.0)
+    outside = sine
+    if polarisation == "vertical":
+        outside = sine * epsilon
     return (outside - inside) / (outside + inside)

@@ -1,5 +1,6 @@
-"""The land z = 0 that a station, or a link, sees in each of its range cells: patches, and their
-power under the beams.
+"""The land z = 0 that a station, or a link, sees in each of its range cells.
+
+It consists of patches, whose power under the beams is computed.
 
 The land at one range sum is an ellipse, the section of an ellipsoid whose foci are the two arrays;
 of a single station it is a circle. The sum runs over the eccentric anomaly nu, which places patches
@@ -37,11 +38,9 @@ class Land(NamedTuple):
     """Patches of land (K,) in the order of their range cells; none depends on the beams.
 
     cell: (C,) numbers of the cells with land, and first: (C,) each one's first patch; cells: number
-    of all cells;
-    weight: area times the root of both grazing angles' sines, over both squared ranges, times both
-    element gains;
-    seen: (2, 2, K) direction cosines, across and up, from the sender and the receiver, of a station
-    (1, 2, K); slow: cosine of half the bistatic angle.
+    of all cells; weight: area times the root of both grazing angles' sines, over both squared
+    ranges, times both element gains; seen: (2, 2, K) direction cosines, across and up, from the
+    sender and the receiver, of a station (1, 2, K); slow: cosine of half the bistatic angle.
     """
 
     cell: np.ndarray
@@ -58,8 +57,9 @@ def ramp(subcarriers: int) -> np.ndarray:
 
 
 def folded(values: np.ndarray, subcarriers: int) -> np.ndarray:
-    """Return values (cells, ...) summed into the M cells that they share: land beyond the
-    unambiguous range folds.
+    """Return values (cells, ...) summed into the M cells that they share.
+
+    Land beyond the unambiguous range folds.
     """
     periods = -(-len(values) // subcarriers)
     beside = values.shape[1:]
@@ -69,18 +69,31 @@ def folded(values: np.ndarray, subcarriers: int) -> np.ndarray:
 
 
 def with_side_lobes(power: np.ndarray, subcarriers: int) -> np.ndarray:
-    """Return the mean power (M,) in the M range cells of patches of independent phase with `power`
-    (cells,).
+    """Return the mean power (M,) in the M range cells of patches of independent phase.
+
+    power: (cells,), that of the patches.
     """
     lobe = abs(np.fft.ifft(ramp(subcarriers))) ** 2
     return np.fft.ifft(np.fft.fft(folded(power, subcarriers)) * np.fft.fft(lobe)).real
 
 
-def ellipses(
-    t: np.ndarray, half_m: float, heights_m: tuple[float, float]
-) -> tuple[np.ndarray, ...]:
-    """Return the land's ellipses of half range sums t (T,) m: centre, both half axes, and the
-    centre's and both squared half axes' change with t, each (T,).
+class Ellipses(NamedTuple):
+    """Ellipses of the land, (T,) each; rates are changes with the half range sum t.
+
+    centre, long, short: centre along the axis of the masts and both half axes (m); centre_rate,
+    long_rate, short_rate: those of the centre and of both squared half axes.
+    """
+
+    centre: np.ndarray
+    long: np.ndarray
+    short: np.ndarray
+    centre_rate: np.ndarray
+    long_rate: np.ndarray
+    short_rate: np.ndarray
+
+
+def ellipses(t: np.ndarray, half_m: float, heights_m: tuple[float, float]) -> Ellipses:
+    """Return the land's ellipses of half range sums t (T,) m as `Ellipses`.
 
     The masts stand at -half_m and +half_m on the long axis, the sender first. Source: (R1 + R2)^2 =
     4 t^2 for points in the plane, with the square completed.
@@ -94,13 +107,13 @@ def ellipses(
     q_rate = 2.0 * c**2 / (t * t * t)
     short = np.maximum((t + g) ** 2 - c**2 - sends**2 + q * centre**2, 0.0)
     short_rate = 2.0 * (t + g) * (1.0 - g / t) + q_rate * centre**2 + 2.0 * q * centre * centre_rate
-    return (
-        centre,
-        np.sqrt(short / q),
-        np.sqrt(short),
-        centre_rate,
-        (short_rate - short * q_rate / q) / q,
-        short_rate,
+    return Ellipses(
+        centre=centre,
+        long=np.sqrt(short / q),
+        short=np.sqrt(short),
+        centre_rate=centre_rate,
+        long_rate=(short_rate - short * q_rate / q) / q,
+        short_rate=short_rate,
     )
 
 
@@ -112,7 +125,10 @@ def nearest_m(station: Station) -> float:
 
 
 def _edges(station: Station, reach_m: float, cells_per_m: float) -> tuple[np.ndarray, np.ndarray]:
-    """The nearest and farthest half range sum (m) of every cell's land up to `reach_m`, (cells,)."""
+    """Return the nearest and farthest half range sum (m) of every cell's land, (cells,).
+
+    Land reaches up to `reach_m`.
+    """
     cells = max(int(np.ceil(reach_m * cells_per_m + 0.5 - OFFSET)), 0)
     low_m = nearest_m(station)
     edge = (np.arange(cells)[:, None] + [-0.5, 0.5] + OFFSET) / cells_per_m
@@ -124,14 +140,14 @@ class _Rings(NamedTuple):
     """Ellipses of the land, several in each range cell that has land.
 
     lit: (C,) those cells, of `cells`; t: (T,) half range sums (m); step: (T,) their shares of a
-    cell's extent (m); shapes: what `ellipses` returns; counts: (T,) patches of each ellipse.
+    cell's extent (m); shapes: of the ellipses; counts: (T,) patches of each ellipse.
     """
 
     lit: np.ndarray
     cells: int
     t: np.ndarray
     step: np.ndarray
-    shapes: tuple[np.ndarray, ...]
+    shapes: Ellipses
     counts: np.ndarray
 
 
@@ -151,13 +167,17 @@ def _rings(
     low = low[lit]
     high = high[lit]
     node, share = gauss_legendre(nodes)
-    t = (0.5 * (high + low)[:, None] + 0.5 * (high - low)[:, None] * node).ravel()
-    step = (0.5 * (high - low)[:, None] * share).ravel()
+    middle = 0.5 * (high + low)[:, None]
+    half_extent = 0.5 * (high - low)[:, None]
+    t = (middle + half_extent * node).ravel()
+    step = (half_extent * share).ravel()
     shapes = ellipses(t, half_m, heights_m)
-    centre, long, short = shapes[:3]
     # The beams turn past the patches fastest where the ellipse passes a mast.
-    tip = [np.hypot(centre + side * (long - half_m), heights_m[side > 0]) for side in (-1, 1)]
-    stretch = np.maximum(1.0, short / np.minimum(*tip))
+    beyond = shapes.long - half_m
+    sender_m, receiver_m = heights_m
+    from_sender = np.hypot(shapes.centre - beyond, sender_m)
+    from_receiver = np.hypot(shapes.centre + beyond, receiver_m)
+    stretch = np.maximum(1.0, shapes.short / np.minimum(from_sender, from_receiver))
     counts = 2 * np.ceil(turns * stretch - 1e-9).astype(int)
     return _Rings(lit, cells, t, step, shapes, counts)
 
@@ -171,32 +191,30 @@ def _patches(
     """
     of_ring = np.repeat(np.arange(len(rings.t)), rings.counts)
     number = np.concatenate([np.arange(0), *map(np.arange, rings.counts)])
-    centre, long, short, centre_rate, long_rate, short_rate = (
-        values[of_ring] for values in rings.shapes
-    )
+    ring = Ellipses(*(values[of_ring] for values in rings.shapes))
     nu = 2.0 * np.pi * (number + 0.5) / rings.counts[of_ring]
     s, c = portable.sine_cosine(nu)
-    along = centre + long * c
-    aside = short * s
+    along = ring.centre + ring.long * c
+    aside = ring.short * s
     middle_m = 0.5 * (masts_m[0] + masts_m[1])
     points = np.zeros((len(nu), 3))
     points[:, 0] = middle_m[0] + along * axis[0] - aside * axis[1]
     points[:, 1] = middle_m[1] + along * axis[1] + aside * axis[0]
     narrow = np.sqrt(1.0 - (half_m / rings.t[of_ring]) ** 2)
-    area = (
-        centre_rate * short * c
-        + 0.5 * narrow * long_rate * c * c
-        + 0.5 * short_rate / narrow * s * s
-    )
-    return points, area * (rings.step * 2.0 * np.pi / rings.counts)[of_ring]
+    area = ring.centre_rate * ring.short * c
+    area = area + 0.5 * narrow * ring.long_rate * c * c
+    area = area + 0.5 * ring.short_rate / narrow * s * s
+    per_patch = rings.step * 2.0 * np.pi / rings.counts
+    return points, area * per_patch[of_ring]
 
 
 @lru_cache(maxsize=12)
 def land(
     network: Network, station: Station, reach_m: float, element: Element | None, nodes: int = NODES
 ) -> Land:
-    """Return the patches of land up to the half range sum `reach_m`; element: the antennas', None
-    for isotropic.
+    """Return the patches of land up to the half range sum `reach_m`.
+
+    element: the antennas', None for isotropic.
     """
     radio = radar(network, station)
     ends = (station.transmitter or station, station)
@@ -206,13 +224,16 @@ def land(
     heights_m = (float(masts_m[0, 2]), float(masts_m[1, 2]))
     # For a station, or ends above each other, the ellipses are circles, which begin along the
     # receiver's array.
-    axis = between / (2.0 * half_m) if half_m > 0 else station.horizontal[:2]
+    axis = station.horizontal[:2]
+    if half_m > 0:
+        axis = between / (2.0 * half_m)
     # Over azimuth the trapezoidal rule is exact for a station's arrays, whose patterns are
     # trigonometric.
     turns = int(np.pi * radio.kappa * (network.transmit[0] + network.receive[0])) + 24
     rings = _rings(station, reach_m, radio.cells, half_m, heights_m, turns, nodes)
     points, weight = _patches(rings, masts_m, half_m, axis)
-    r1, r2 = (portable.norm(points - mast_m) for mast_m in masts_m)
+    r1 = portable.norm(points - masts_m[0])
+    r2 = portable.norm(points - masts_m[1])
     weight *= np.sqrt(heights_m[0] * heights_m[1] / (r1 * r2)) / (r1 * r2) ** 2
     if element is not None:
         weight *= antenna.gain(element, ends[0], points) * antenna.gain(element, ends[1], points)
@@ -228,7 +249,8 @@ def land(
         circles = (len(rings.t), 2, turns)
         both = weight.reshape(circles)
         weight = (both + both[:, ::-1, ::-1])[:, 0].ravel()
-        seen = cosines(station, points).T.reshape(2, *circles)[:, :, 0].reshape(1, 2, -1)
+        on_circles = cosines(station, points).T.reshape(2, *circles)
+        seen = on_circles[:, :, 0].reshape(1, 2, -1)
         slow = np.ones(len(weight))
         counts = counts // 2
     of_cells = counts.reshape(-1, nodes).sum(axis=1)
@@ -244,8 +266,9 @@ def cell_power(
     element: Element | None = None,
     nodes: int = NODES,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the mean power (cells,) W of the land in every cell, and the factor on its Doppler,
-    mean cos(beta / 2).
+    """Return the mean power (cells,) W of the land in every cell, and the factor on its Doppler.
+
+    The factor is the mean of cos(beta / 2).
 
     settings: gamma and reach_m; cells beyond the M unambiguous ones are included; aims_m: (2, 3) m,
     where the sender's and the receiver's beams point; element: as in `land`. The integral of G_T

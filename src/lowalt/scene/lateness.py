@@ -1,5 +1,6 @@
-"""How late the symbols of a sample are, drawn again from its name: for spectra that know the
-instants.
+"""How late the symbols of a sample are, drawn again from its name.
+
+They are for spectra that know the instants.
 """
 
 from collections.abc import Mapping
@@ -12,18 +13,21 @@ from lowalt.scene.effects import called, look_stream, offering, only
 
 
 def late_effects(config: Mapping[str, Any]) -> dict[str, dict]:
-    """Return those of a configuration's `effects` that set the instants of symbols, if its spectra
-    know them.
+    """Return those of a configuration's `effects` that set the instants of symbols.
+
+    There are none unless its spectra know the instants.
     """
-    known = config["spectra"].get("times") == "known"
-    return offering(config["effects"], "transmitter", "sampling") if known else {}
+    if config["spectra"].get("times") != "known":
+        return {}
+    return offering(config["effects"], "transmitter", "sampling")
 
 
 def lateness(
     spectra: Mapping[str, Any], effects: Mapping[str, Any], network: Network, seed: int, row: dict
 ) -> np.ndarray | None:
-    """Return how many symbol intervals each symbol came after its nominal instant, (stations, N);
-    None for on time.
+    """Return how many symbol intervals each symbol came after its nominal instant.
+
+    The result is (stations, N), or None for on time.
 
     spectra, effects: blocks of the configuration; row: motion table (subtype and model). None too
     where the spectra do not ask for instants. The draws are those of the effect, so nothing has to
@@ -39,4 +43,6 @@ def lateness(
         rng = look_stream(seed, effect.name, row, station.name)
         times_s.append(sampling(network, rng).times_s)
     late = (np.stack(times_s) - network.times_s) / network.symbol_interval_s
-    return late if late.any() else None
+    if not late.any():
+        return None
+    return late

@@ -1,5 +1,6 @@
-"""The levels of one sample at one station, as a link budget lists them: watts and gains in
-decibels.
+"""The levels of one sample at one station, as a link budget lists them.
+
+They are watts and gains in decibels.
 
 Powers are those of one subcarrier, or of one sample of an FMCW sweep, as the echo's amplitudes are.
 A range cell is the mean of M of them, so an echo keeps its level in its cell, while noise falls by
@@ -28,7 +29,9 @@ class Level(NamedTuple):
 
 def decibels(ratio: float) -> float:
     """Return a ratio of powers in dB, -inf for none."""
-    return 10 * math.log10(ratio) if ratio > 0 else -math.inf
+    if ratio <= 0:
+        return -math.inf
+    return 10 * math.log10(ratio)
 
 
 def dbm(power_w: float) -> float:
@@ -46,47 +49,47 @@ def levels(view: View, effects: Sequence[NamedEffect], echo_w: float) -> list[Le
     2001, ch. 1.
     """
     network = view.network
-    link = view.station.transmitter is not None
+    sender = view.station.transmitter
     wavelength_m = SPEED_OF_LIGHT / network.carrier_hz
-    out_m, back_m = (float(norm(view.origin_m - mast_m)) for mast_m in view.masts_m)
+    sender_m, receiver_m = view.masts_m
+    out_m = float(norm(view.origin_m - sender_m))
+    back_m = float(norm(view.origin_m - receiver_m))
+    path = f"path out and back, {out_m:.1f} m, 1 m2"
     ends = {"toward the target, each way": view.station}
-    if link:
-        ends = {"of the sender": view.station.transmitter, "of the receiver": view.station}
-    gains = [
-        1.0 if view.element is None else float(antenna.gain(view.element, end, view.origin_m))
-        for end in ends.values()
-    ]
+    if sender is not None:
+        path = f"path, {out_m:.1f} m and {back_m:.1f} m, 1 m2"
+        ends = {"of the sender": sender, "of the receiver": view.station}
+    gains_db = {}
+    for name, end in ends.items():
+        gains_db[name] = 0.0
+        if view.element is not None:
+            gains_db[name] = decibels(float(antenna.gain(view.element, end, view.origin_m)))
+    path_db = decibels(wavelength_m**2 / ((4 * math.pi) ** 3 * out_m**2 * back_m**2))
+    cross_section_db = decibels(mean_cross_section(view.cloud, wavelength_m))
     budget = [
         Level(f"transmit power, {network.bin_name}", dbm(network.power), "dBm"),
         Level("transmit array", decibels(math.prod(network.transmit)), "dB"),
         Level("receive array", decibels(math.prod(network.receive)), "dB"),
-        *(
-            Level(f"element {name}", decibels(gain), "dBi")
-            for name, gain in zip(ends, gains, strict=True)
-        ),
-        Level(
-            f"path, {out_m:.1f} m and {back_m:.1f} m, 1 m2"
-            if link
-            else f"path out and back, {out_m:.1f} m, 1 m2",
-            decibels(wavelength_m**2 / ((4 * math.pi) ** 3 * out_m**2 * back_m**2)),
-            "dB",
-        ),
-        Level("mean cross section", decibels(mean_cross_section(view.cloud, wavelength_m)), "dBsm"),
+        *(Level(f"element {name}", gain_db, "dBi") for name, gain_db in gains_db.items()),
+        Level(path, path_db, "dB"),
+        Level("mean cross section", cross_section_db, "dBsm"),
     ]
-    # A station's element counts twice.
-    expected_dbm = sum(level.value for level in budget) + (0.0 if link else decibels(gains[0]))
-    whole = Level(
-        f"transmit power, {network.subcarriers} subcarriers",
-        dbm(network.power * network.subcarriers),
-        "dBm",
-    )
-    return [
-        *([whole] if network.waveform == "ofdm" else []),
+    expected_dbm = sum(level.value for level in budget)
+    if sender is None:
+        # A station's element counts twice.
+        expected_dbm += sum(gains_db.values())
+    lines = [
         *budget,
         Level("expected echo", expected_dbm, "dBm"),
         Level("echo of this sample, mean |Y_bin|^2", dbm(echo_w), "dBm"),
         *_beside(view, effects, expected_dbm),
     ]
+    if network.waveform == "ofdm":
+        whole_dbm = dbm(network.power * network.subcarriers)
+        lines.insert(
+            0, Level(f"transmit power, {network.subcarriers} subcarriers", whole_dbm, "dBm")
+        )
+    return lines
 
 
 def _beside(view: View, effects: Sequence[NamedEffect], expected_dbm: float) -> list[Level]:
@@ -95,11 +98,10 @@ def _beside(view: View, effects: Sequence[NamedEffect], expected_dbm: float) -> 
     result = []
     for lines in every(effects, "levels").values():
         for name, value, unit in lines(view):
-            result.append(
-                Level(name, dbm(value), "dBm")
-                if unit == "W"
-                else Level(name, decibels(value), "dB")
-            )
+            if unit == "W":
+                result.append(Level(name, dbm(value), "dBm"))
+            else:
+                result.append(Level(name, decibels(value), "dB"))
     if noise_w := only(effects, "noise_w"):
         noise_dbm = dbm(noise_w(network))
         cell_dbm = noise_dbm - decibels(network.subcarriers)

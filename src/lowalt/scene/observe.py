@@ -15,8 +15,9 @@ from lowalt.targets.cloud import Cloud
 
 @dataclass(frozen=True)
 class Scene:
-    """A scene: its network, seed, the echo engine's tolerance, and its effects in the chain's
-    order.
+    """A scene: its network, seed, the echo engine's tolerance, and its effects.
+
+    The effects are in the chain's order.
     """
 
     network: Network
@@ -28,13 +29,13 @@ class Scene:
         refuse_unmodelled(self.network, {effect.name: effect.module for effect in self.effects})
 
     def stream(self, name: str, row: dict, *ends: str) -> np.random.Generator:
-        """Return the stream of an effect for the motion model `row`, from its start at every call."""
+        """Return the stream of an effect for the motion model `row`, from its start.
+
+        more: stations whose draws it holds.
+        """
         # Each SNR has a stream of its own, so its noise does not depend on the other SNRs.
-        levels = [
-            effect.snr_db
-            for effect in self.effects
-            if effect.name == name and effect.snr_db is not None
-        ]
+        of_name = [effect.snr_db for effect in self.effects if effect.name == name]
+        levels = [snr_db for snr_db in of_name if snr_db is not None]
         return look_stream(self.seed, name, row, *ends, *levels)
 
     def drawn(self, row: dict, station: Station, name: str) -> np.random.Generator:
@@ -48,15 +49,15 @@ class Scene:
         drawn = getattr(module, "DRAWN", "station")
         if drawn == "look":
             return self.stream(name, row)
-        if drawn == "pair" and station.transmitter is not None:
-            return self.stream(
-                name, row, *sorted((station.transmitter.name, station.receiver.name))
-            )
+        ends = [end for end in (station.transmitter, station.receiver) if end is not None]
+        if drawn == "pair" and ends:
+            return self.stream(name, row, *sorted(end.name for end in ends))
         return self.stream(name, row, station.name)
 
     def at_snr(self, snr_db: float) -> "Scene":
-        """Return the scene with noise in all range cells at this SNR (dB), instead of at each of
-        noise.snr_db.
+        """Return the scene with noise in all range cells at this SNR (dB).
+
+        In the scene itself noise is added at each of noise.snr_db.
         """
         changed = [effect.at_snr(snr_db) for effect in self.effects]
         return replace(self, effects=tuple(effect for effect in changed if not effect.idle))
@@ -66,13 +67,8 @@ def with_cross_sections(scene: Scene, cloud: Cloud) -> Cloud:
     """Return the cloud with the cross sections that the scene gives its points."""
     wavelength_m = SPEED_OF_LIGHT / scene.network.carrier_hz
     for name, cross_sections in every(scene.effects, "cross_sections").items():
-        rcs_m2 = numbers(
-            name,
-            "cross_sections",
-            cross_sections(cloud, wavelength_m),
-            [cloud.rcs_m2.shape],
-            real=True,
-        )
+        found = cross_sections(cloud, wavelength_m)
+        rcs_m2 = numbers(name, "cross_sections", found, [cloud.rcs_m2.shape], real=True)
         if (rcs_m2 < 0).any():
             raise InputError(
                 f"{name}: cross_sections gives {rcs_m2.min():g} m2, expected no number below 0"
@@ -89,8 +85,9 @@ def observe(
     occluders: dict | None = None,
     beside: View | None = None,
 ) -> View:
-    """Return the view of a sample from a station, with the motion effects of the scene, which all
-    stations share.
+    """Return the view of a sample from a station, with the motion effects of the scene.
+
+    All stations share these effects.
 
     The view's cloud has the cross sections that the scene gives its points. occluders: the target's
     surfaces; beside: of a companion, the view of the labelled target, whose instants and beams it

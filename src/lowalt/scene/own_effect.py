@@ -1,5 +1,6 @@
-"""An effect of the user's own: a Python file that an overlay names by its path, `effects:
-{path/to/rain.py: {...}}`.
+"""An effect of the user's own: a Python file that an overlay names by its path.
+
+Such an overlay has `effects: {path/to/rain.py: {...}}`.
 
 The file keeps the contract of effects (`lowalt.scene.contract`); its place is that of the functions
 that it offers, and it acts behind the shipped effects of that place. It runs with the rights of the
@@ -42,13 +43,15 @@ def _run(name: str, source: bytes) -> ModuleType:
 
 
 def kept_contract(name: str, module: ModuleType) -> ModuleType:
-    """Return the module of an effect from outside of the core. Raises: InputError where it breaks
-    the contract.
+    """Return the module of an effect from outside of the core.
+
+    Raises: InputError where it breaks the contract.
     """
     defaults = getattr(module, "DEFAULTS", None)
     if not isinstance(defaults, dict) or not all(isinstance(key, str) for key in defaults):
         raise InputError(
-            f"effects: {name}: DEFAULTS is {str(defaults)[:100]}, expected every parameter with its value"
+            f"effects: {name}: DEFAULTS is {str(defaults)[:100]}, expected every parameter with "
+            "its value"
         )
     if not isinstance(getattr(module, "SOURCE", None), str):
         raise InputError(
@@ -75,15 +78,19 @@ def place_of(name: str, module: ModuleType) -> str:
     places = {OFFERS[function].place for function in offered} - {""}
     if len(places) > 1 or not offered:
         raise InputError(
-            f"effects: {name}: offers {list(offered)}, expected functions of one place of lowalt.scene.contract"
+            f"effects: {name}: offers {list(offered)}, expected functions of one place of "
+            "lowalt.scene.contract"
         )
     for function, found in offered.items():
         takes = ("settings", *OFFERS[function].takes)
         if tuple(inspect.signature(found).parameters) != takes:
             raise InputError(
-                f"effects: {name}: expected {function}({', '.join(takes)}), as lowalt.scene.contract says"
+                f"effects: {name}: expected {function}({', '.join(takes)}), as "
+                "lowalt.scene.contract says"
             )
-    return places.pop() if places else "channel"
+    if not places:
+        return "channel"
+    return places.pop()
 
 
 def _kind(value: object) -> str:
@@ -101,26 +108,26 @@ def _kind(value: object) -> str:
 
 
 def checked(name: str, module: ModuleType, changed: dict) -> dict:
-    """Return the settings of an effect whose values have the types of its DEFAULTS; a default of
-    None takes any.
+    """Return the settings of an effect whose values have the types of its DEFAULTS.
+
+    A default of None takes any value.
 
     Raises: InputError naming the key and its value.
     """
-    changed = {
-        key: float(value)
-        if isinstance(value, str)
-        and _kind(module.DEFAULTS.get(key)) == "a number"
-        and NUMBER.fullmatch(value)
-        else value
-        for key, value in changed.items()
-    }
+    result = dict(module.DEFAULTS)
     for key, value in changed.items():
         default = module.DEFAULTS.get(key)
         expected = _kind(default)
+        # YAML reads a number such as 1e3 as text.
+        if expected == "a number" and isinstance(value, str) and NUMBER.fullmatch(value):
+            value = float(value)
         finite = not isinstance(value, float) or math.isfinite(value)
         if default is not None and (_kind(value) != expected or not finite):
-            finitely = "a finite number" if not finite else expected
+            if not finite:
+                expected = "a finite number"
             raise InputError(
-                f"effects.{name}.{key}: {str(value)[:100]!r}, expected {finitely} as its default {default!r}"
+                f"effects.{name}.{key}: {str(value)[:100]!r}, expected {expected} as its default "
+                f"{default!r}"
             )
-    return {**module.DEFAULTS, **changed}
+        result[key] = value
+    return result

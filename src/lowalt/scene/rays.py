@@ -1,5 +1,6 @@
-"""Which points of a target a station cannot see: straight rays to the station against the target's
-moving triangles.
+"""Which points of a target a station cannot see: straight rays against moving triangles.
+
+Rays go from a point to the station, the triangles are the target's.
 
 In a part's own frame its triangles stand still, in a tree of boxes that is made once. The rays of a
 point in successive symbols differ little, so they traverse the tree together (`rays_loops`). Seen
@@ -23,8 +24,9 @@ LEAF = 4
 
 
 class Tree(NamedTuple):
-    """A part's triangles (F, 9), a corner and both edges, in a tree of boxes (2 B, 6) as
-    `rays_loops` walks it.
+    """A part's triangles in a tree of boxes, as `rays_loops` walks it.
+
+    boxes: (2 B, 6); triangles: (F, 9), a corner and both edges; closed: whether the surface is.
     """
 
     boxes: np.ndarray
@@ -45,8 +47,9 @@ class _Same(NamedTuple):
 
 
 def tree(corners: np.ndarray, closed: bool) -> Tree:
-    """Return the tree of triangles with `corners` (F, 3, 3) m: each node is split in halves along
-    its longest side.
+    """Return the tree of triangles with `corners` (F, 3, 3) m.
+
+    Each node is split in halves along its longest side.
     """
     leaves = 1
     while leaves * LEAF < len(corners):
@@ -64,14 +67,13 @@ def tree(corners: np.ndarray, closed: bool) -> Tree:
     low = corners.min(axis=(1, 2)) - rays_loops.ROOM_M
     high = corners.max(axis=(1, 2)) + rays_loops.ROOM_M
     boxes = np.empty((2 * leaves, 6))
+    # Level by level from the leaves, nodes B to 2 B - 1, up to the root, node 1.
     while leaves:
-        boxes[leaves : 2 * leaves, :3], boxes[leaves : 2 * leaves, 3:] = low, high
-        low = low[::2]
-        high = high[::2]
+        boxes[leaves : 2 * leaves, :3] = low
+        boxes[leaves : 2 * leaves, 3:] = high
+        low = np.minimum(low[::2], low[1::2])
+        high = np.maximum(high[::2], high[1::2])
         leaves = leaves // 2
-        if leaves:
-            low = np.minimum(low, boxes[2 * leaves + 1 : 4 * leaves : 2, :3])
-            high = np.maximum(high, boxes[2 * leaves + 1 : 4 * leaves : 2, 3:])
     first, second, third = corners.reshape(-1, 3, 3).swapaxes(0, 1)
     return Tree(boxes, np.concatenate([first, second - first, third - first], axis=1), closed)
 
@@ -89,8 +91,9 @@ def _trees(same: _Same) -> dict[int, Tree]:
 
 
 def _around(axis: np.ndarray, rotation: np.ndarray, toward: np.ndarray) -> np.ndarray:
-    """Symbols (N,), sorted by the azimuth of the station, in direction `toward` (N, 3), around a
-    part's axis (3,).
+    """Return the symbols (N,), sorted by the azimuth of the station around a part's axis (3,).
+
+    toward: (N, 3), direction of the station.
     """
     seen = portable.applied(rotation.swapaxes(1, 2), toward)
     right = np.cross(axis, np.eye(3)[abs(axis).argmin()])
@@ -109,8 +112,9 @@ def hidden_by(
     casts: Collection[int],
     hidden: np.ndarray,
 ) -> None:
-    """Set hidden (N, L) where a triangle of the parts `casts` stands between a point and the
-    station at place_m (3,).
+    """Set hidden (N, L) where a triangle stands between a point and the station at place_m (3,).
+
+    casts: the parts whose triangles are asked.
 
     motion: poses, and points (L, 3) moved off their own surface, in their parts' frames (m); axes
     (P, 3): rotation axes in the parts' frames, NaN for parts that do not rotate; toward (L,): the
@@ -122,36 +126,39 @@ def hidden_by(
     moved = (rotation, translation, points, part.astype(np.int64))
     strip = rays_loops.STRIP
     turns = np.isfinite(axes).all(axis=1)
-    orders = [
-        _around(axes[p], rotation[:, p], place_m - translation[:, p])
-        if turns[p]
-        else np.arange(len(rotation))
-        for p in range(len(axes))
-    ]
-    # The last strip is padded with its last symbol.
-    strips = [
-        np.pad(order, (0, -len(order) % strip), "edge").reshape(-1, strip) for order in orders
-    ]
-    count = len(strips[0])
+    strips = []
+    for p in range(len(axes)):
+        order = np.arange(len(rotation))
+        if turns[p]:
+            order = _around(axes[p], rotation[:, p], place_m - translation[:, p])
+        # The last strip is padded with its last symbol.
+        padded = np.pad(order, (0, -len(order) % strip), "edge")
+        strips.append(padded.reshape(-1, strip))
     result = np.ascontiguousarray(hidden.T)
-    work = tuple(map(np.empty, ((count, 15, strip), (9, strip), 12, strip)))
+    work = rays_loops.Work(
+        poses=np.empty((len(strips[0]), 15, strip)),
+        ray=np.empty((9, strip)),
+        bundle=np.empty(12),
+        free=np.empty(strip),
+    )
     trees = {p: held for p, held in _trees(_Same(surfaces)).items() if p in casts}
     # A point's own part, which hides it most often, comes first.
-    for p, q in sorted(product(trees, range(len(axes))), key=lambda pair: pair[0] != pair[1]):
-        rays_loops.cast(
-            trees[p], moved, place_m, strips[p if turns[p] else q], (p, q), toward, work, result
-        )
+    pairs = sorted(product(trees, range(len(axes))), key=lambda pair: pair[0] != pair[1])
+    for p, q in pairs:
+        in_strips = strips[p] if turns[p] else strips[q]
+        rays_loops.cast(trees[p], moved, place_m, in_strips, (p, q), toward, work, result)
     hidden[:] = result.T
 
 
 def hidden_by_bones(
     surfaces: dict, place_m: np.ndarray, nodes: np.ndarray, hidden: np.ndarray
 ) -> None:
-    """Set hidden (N, L) where a capsule around a bone stands between a node of nodes (N, L, 3) m
-    and the station.
+    """Set hidden (N, L) where a capsule around a bone stands between a node and the station.
 
-    place_m: the station's place (3,). A capsule hides neither nodes inside it nor the ends of its
-    bone.
+    nodes: (N, L, 3) m.
+
+    place_m: the station's position (3,). A capsule hides neither nodes inside it nor the ends of
+    its bone.
     """
     result = np.ascontiguousarray(hidden.T)
     apart = np.ascontiguousarray(nodes.transpose(1, 2, 0))

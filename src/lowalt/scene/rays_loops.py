@@ -1,11 +1,13 @@
-"""The compiled loops of `rays`: the rays of one point in many symbols traverse a part's tree of
-boxes together.
+"""The compiled loops of `rays`: the rays of one point in many symbols, traced together.
+
+They traverse a part's tree of boxes.
 
 A bundle is the rays of one point in STRIP symbols. Boxes that none of its rays can meet are
 skipped; leaves and triangles are tested against all its rays at once, in vector instructions.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,14 +17,30 @@ STRIP = 16
 """Symbols in a bundle of rays."""
 ROOM_M = 1e-9
 """Margin of boxes for rounding (m)."""
+SHORTEST = 1e-30
+"""Least size of a way's coordinate that divides (m)."""
 FLAT = 1e-12
 """Squared sine of the angle between a ray and a bone, below which they count as parallel."""
 
 
+class Work(NamedTuple):
+    """Work arrays of `cast`.
+
+    poses: (strips, 15, STRIP), filled by `_relative`; ray: (9, STRIP) and bundle: (12,), filled by
+    `_sent`; free: (STRIP,), 1 for rays that meet nothing.
+    """
+
+    poses: np.ndarray
+    ray: np.ndarray
+    bundle: np.ndarray
+    free: np.ndarray
+
+
 @INNER_ORDERED
 def _relative(rotation, translation, place, symbols, pair, pose):
-    """Fill pose (15, STRIP) for some symbols: turn and shift of part q as part p sees it, and the
-    station there.
+    """Fill pose (15, STRIP) for some symbols.
+
+    They are turn and shift of part q as part p sees it, and the station there.
     """
     p, q = pair
     for k in range(STRIP):
@@ -60,8 +78,9 @@ def _span(values):
 
 @INNER_ORDERED
 def _sent(pose, point, toward, ray, bundle):
-    """Fill ray (9, STRIP) with starts, ways to the station and their inverses; and bundle (12,),
-    boxes around them.
+    """Fill ray (9, STRIP) and bundle (12,) of one point.
+
+    The ray holds starts, ways to the station and their inverses; the bundle boxes around them.
     """
     for i in range(3):
         r0 = pose[3 * i]
@@ -76,15 +95,19 @@ def _sent(pose, point, toward, ray, bundle):
             at = r0[k] * point[0] + r1[k] * point[1] + r2[k] * point[2] + t[k]
             start[k] = at + toward * (s[k] - at)
             way[k] = s[k] - start[k]
-            over[k] = 1.0 / (way[k] if abs(way[k]) > 1e-30 else 1e-30)
+            divisor = way[k]
+            if abs(divisor) <= SHORTEST:
+                divisor = SHORTEST
+            over[k] = 1.0 / divisor
         bundle[i], bundle[6 + i] = _span(start)
         bundle[3 + i], bundle[9 + i] = _span(way)
 
 
 @INNER_ORDERED
 def can_meet(bundle, box):
-    """Whether any ray of a bundle can meet a box (6,), low and high corner: no axis across or along
-    it separates them.
+    """Whether any ray of a bundle can meet a box (6,), its low and high corner.
+
+    Then no axis across or along it separates them.
 
     Source: separating axes, Gottschalk, Lin & Manocha, OBBTree, SIGGRAPH 1996, widened by the
     spread of the rays.
@@ -120,8 +143,9 @@ def can_meet(bundle, box):
 
 @INNER_ORDERED
 def _meets(ray, free, box):
-    """Whether a free ray meets a box (6,) between its start and the station: it is in all three
-    slabs at once.
+    """Whether a free ray meets a box (6,) between its start and the station.
+
+    A ray meets it where it is in all three slabs at once.
     """
     x = ray[0]
     y = ray[1]
@@ -145,14 +169,16 @@ def _meets(ray, free, box):
         c1 = (f - z[k]) * w[k]
         enters = max(max(min(a0, a1), min(b0, b1)), max(min(c0, c1), 0.0))
         leaves = min(min(max(a0, a1), max(b0, b1)), min(max(c0, c1), 1.0))
-        most = max(most, free[k] if enters <= leaves else 0.0)
+        met = free[k] if enters <= leaves else 0.0
+        most = max(most, met)
     return most > 0.0
 
 
 @INNER_ORDERED
 def _shadow(triangle, closed, ray, free):
-    """Set free (STRIP,) to 0 where rays meet a triangle (9,): a corner and both edges; Moeller &
-    Trumbore 1997.
+    """Set free (STRIP,) to 0 where rays meet a triangle (9,), a corner and both edges.
+
+    Source: Moeller & Trumbore 1997.
 
     Of a closed surface with outward normals, only faces turned to the station hide anything.
     """
@@ -165,7 +191,9 @@ def _shadow(triangle, closed, ray, free):
     e0 = triangle[6]
     e1 = triangle[7]
     e2 = triangle[8]
-    largest = 0.0 if closed else np.inf
+    largest = np.inf
+    if closed:
+        largest = 0.0
     x = ray[0]
     y = ray[1]
     z = ray[2]
@@ -209,8 +237,9 @@ def _left(triangles, first, count, closed, ray, free):
 
 @INNER_ORDERED
 def _walk(boxes, triangles, closed, ray, bundle, free, last):
-    """Set free (STRIP,) to 0 where rays meet a part's triangles; return the leaf that hid the last
-    one, 0 for none.
+    """Set free (STRIP,) to 0 where rays meet a part's triangles.
+
+    Returns the leaf that hid the last one, 0 for none.
 
     boxes (2 B, 6): node k holds nodes 2 k and 2 k + 1, the root is node 1, and nodes from B on are
     the leaves, whose triangles (F, 9) follow each other. last: the leaf to begin with, 0 for none.
@@ -239,21 +268,23 @@ def _walk(boxes, triangles, closed, ray, bundle, free, last):
 
 @ORDERED
 def cast(tree, motion, place, order, pair, toward, work, hidden):
-    """Set hidden (L, N) where triangles of part p stand between points of part q and the station at
-    `place` (3,).
+    """Set hidden (L, N) where triangles of part p stand between points of part q and the station.
 
-    tree: `rays.Tree` of p; motion: as in `rays.hidden_by`; order (strips, STRIP):
-    symbols of each bundle, where one may come twice; pair: (p, q); toward (L,): as in
-    `rays.hidden_by`; work: poses (strips, 15, STRIP), ray (9, STRIP), bundle (12,) and free
-    (STRIP,).
+    place: (3,), the station's position.
+
+    tree: `rays.Tree` of p; motion: as in `rays.hidden_by`; order (strips, STRIP): symbols of each
+    bundle, where one may come twice; pair: (p, q); toward (L,): as in `rays.hidden_by`.
     """
-    (boxes, triangles, closed), (rotation, translation, points, part) = tree, motion
+    boxes, triangles, closed = tree
+    rotation, translation, points, part = motion
     poses, ray, bundle, free = work
     for strip in range(len(order)):
         _relative(rotation, translation, place, order[strip], pair, poses[strip])
     for l in range(len(points)):  # noqa: E741
+        if part[l] != pair[1]:
+            continue
         last = 0
-        for strip in range(len(order) if part[l] == pair[1] else 0):
+        for strip in range(len(order)):
             symbols = order[strip]
             left = 0.0
             for k in range(STRIP):
@@ -269,8 +300,9 @@ def cast(tree, motion, place, order, pair, toward, work, hidden):
 
 @INNER_ORDERED
 def _capsule(node, first, second, place, square, hidden):
-    """Set hidden (N,) where the rays p + s d, s > 0, from nodes (3, N) come within a capsule round
-    a bone, a + t e.
+    """Set hidden (N,) where rays come within a capsule round a bone, a + t e.
+
+    The rays p + s d, s > 0, begin at nodes (3, N).
 
     first, second (3, N): the bone's ends; square (m^2): of its radius. A node inside the capsule is
     not hidden by it.
@@ -313,8 +345,9 @@ def _capsule(node, first, second, place, square, hidden):
 
 @ORDERED
 def capsules(place, nodes, bones, radius_m, hidden):
-    """Set hidden (L, N) where a capsule round a bone stands between a node, nodes (L, 3, N) m, and
-    the station.
+    """Set hidden (L, N) where a capsule round a bone stands between a node and the station.
+
+    nodes: (L, 3, N) m.
 
     bones (B, 2): nodes at the ends of each; radius_m (B,). A node stands for the skin around it: a
     capsule hides neither nodes inside it nor the ends of its bone.
@@ -324,11 +357,5 @@ def capsules(place, nodes, bones, radius_m, hidden):
             first = bones[b, 0]
             second = bones[b, 1]
             if l not in (first, second):
-                _capsule(
-                    nodes[l],
-                    nodes[first],
-                    nodes[second],
-                    place,
-                    radius_m[b] * radius_m[b],
-                    hidden[l],
-                )
+                square = radius_m[b] * radius_m[b]
+                _capsule(nodes[l], nodes[first], nodes[second], place, square, hidden[l])

@@ -1,5 +1,6 @@
-"""The frequency response Y[n, m] (Eq. 24) of a moving target over all paths; squint and spherical
-waves on request.
+"""The frequency response Y[n, m] (Eq. 24) of a moving target over all paths.
+
+Squint and spherical waves are computed on request.
 
 A target fills few range cells, so its response is a smooth function of frequency. In each symbol,
 the excess ranges of the points are summed into Chebyshev moments, at one frequency of the band or,
@@ -32,9 +33,8 @@ class ImagePath(NamedTuple):
 
     places: (N, L, 3) m, where the station sees the points (their images); coefficient: the path's
     complex factor in addition to 1/r, a number or (N, L); station_m: (3,) m, the station's image,
-    where the points see the station;
-    sender: on a link, the path of the same kind between the sender and the points, None where both
-    are alike.
+    where the points see the station; sender: on a link, the path of the same kind between the
+    sender and the points, None where both are alike.
     """
 
     places: np.ndarray
@@ -79,13 +79,16 @@ def response(
         outward = [path.outward for path in all_paths]
         out = _end(view, sender, network.transmit, outward, physics)
     points = back.places[0]
-    reach = float(np.sqrt(np.square(points - points.mean(axis=2, keepdims=True)).sum(axis=1).max()))
+    off_middle = points - points.mean(axis=2, keepdims=True)
+    reach = float(np.sqrt(np.square(off_middle).sum(axis=1).max()))
     if squint:
         # Ranges are then measured from the arrays' middles, whose directions to the points differ.
         ends = (out, back)
         aperture = max(end.spacing * _half_diagonal(end.counts) for end in ends)
         nearest = min(float(end.centre.min()) for end in ends) - reach
-        sine = min(reach / nearest, 1.0) if nearest > 0 else 1.0
+        sine = 1.0
+        if nearest > reach:
+            sine = reach / nearest
         reach += 2.0 * aperture * sine
     # Rounded up to a power of sqrt(2), so that a few tables serve all samples.
     reach = 2.0 ** (math.ceil(2 * math.log2(max(reach, 1e-3))) / 2)
@@ -105,28 +108,26 @@ def response(
     for a, b in np.ndindex(result.shape[:2]):
         if same and b < a:
             continue
+        # Out by a and back by b also stands for out by b and back by a.
         weight = 2.0 if same and a != b else 1.0
         values = over_band(weight * result[a, b].reshape(symbols, -1), tables)
         range_m = out.centre[a] + back.centre[b]
-        response_loops.add_turned(
-            values, -out.turns * range_m, -range_m * band_m / network.subcarriers, total
-        )
+        start = -out.turns * range_m
+        step = -range_m * band_m / network.subcarriers
+        response_loops.add_turned(values, start, step, total)
     return total
 
 
 def _amplitudes(view: View, factor: np.ndarray | float) -> np.ndarray:
-    """Amplitudes (1 or R, 1 or R, N, L) of the points' echoes at unit distance, a0 lambda
-    sqrt(sigma) / (4 pi)^1.5.
+    """Amplitudes (1 or R, 1 or R, N, L) of the points' echoes at unit distance.
+
+    They are a0 lambda sqrt(sigma) / (4 pi)^1.5.
     """
-    strength = (
-        radar(view.network, view.station).scale
-        * np.sqrt(view.cloud.rcs_m2)
-        * np.asarray(factor, np.float64)
-    )
+    scale = radar(view.network, view.station).scale
+    strength = scale * np.sqrt(view.cloud.rcs_m2) * np.asarray(factor, np.float64)
     strength = strength.reshape((1,) * (4 - strength.ndim) + strength.shape)
-    return np.ascontiguousarray(
-        np.broadcast_to(strength, (*strength.shape[:2], *view.places.shape[:2]))
-    )
+    shape = (*strength.shape[:2], *view.places.shape[:2])
+    return np.ascontiguousarray(np.broadcast_to(strength, shape))
 
 
 def _half_diagonal(counts: np.ndarray) -> float:
@@ -135,8 +136,9 @@ def _half_diagonal(counts: np.ndarray) -> float:
 
 
 def cosines(station: Station, places: np.ndarray) -> np.ndarray:
-    """Return the direction cosines (..., 2), across and up, of places (..., 3) m as a station's
-    array sees them.
+    """Return the direction cosines (..., 2), across and up, of places (..., 3) m.
+
+    They are as a station's array sees them.
     """
     away = places - np.asarray(station.position_m)
     across = portable.dot(away, station.horizontal)
@@ -158,39 +160,38 @@ def _end(
     beams = view.beams_of(station)
     # Rounding must not put the instant of a beam update before that update.
     current = np.searchsorted(beams.starts_s, view.times_s + 1e-9, side="right") - 1
-    images = np.stack(
-        [np.ascontiguousarray(path.places.swapaxes(1, 2), np.float64) for path in paths]
-    )
-    coefficient = np.stack(
-        [
-            np.broadcast_to(np.asarray(path.coefficient, np.complex128), view.places.shape[:2])
-            for path in paths
-        ]
-    )
+    images = np.empty((len(paths), *view.places.swapaxes(1, 2).shape))
+    coefficient = np.empty((len(paths), *view.places.shape[:2]), np.complex128)
+    for number, path in enumerate(paths):
+        images[number] = path.places.swapaxes(1, 2)
+        coefficient[number] = path.coefficient
     mast_m = np.array(station.position_m, np.float64)
     end = response_loops.End(
-        mast_m,
-        station.horizontal[:2].copy(),
-        np.array(counts),
-        SPEED_OF_LIGHT / (2.0 * network.carrier_hz),
-        radio.kappa,
-        frequencies(network, view.station, squint),
-        squint,
-        radio.centre_hz / SPEED_OF_LIGHT,
-        cosines(station, beams.aims_m)[current],
-        images,
-        coefficient,
+        station=mast_m,
+        axes=station.horizontal[:2].copy(),
+        counts=np.array(counts),
+        spacing=SPEED_OF_LIGHT / (2.0 * network.carrier_hz),
+        beam=radio.kappa,
+        kappas=frequencies(network, view.station, squint),
+        squint=squint,
+        turns=radio.centre_hz / SPEED_OF_LIGHT,
+        aims=cosines(station, beams.aims_m)[current],
+        places=images,
+        coefficient=coefficient,
         # Reflection keeps distances, so images lie around their mean as the points do around
         # theirs.
-        portable.norm(images.mean(axis=3) - mast_m),
-        np.empty((0, 0, 0, 0), np.complex128),
+        centre=portable.norm(images.mean(axis=3) - mast_m),
+        gains=np.empty((0, 0, 0, 0), np.complex128),
     )
-    return end._replace(gains=spherical.gains(end, ERROR)) if wavefront else end
+    if not wavefront:
+        return end
+    return end._replace(gains=spherical.gains(end, ERROR))
 
 
 def frequencies(network: Network, station: Station, squint: bool) -> np.ndarray:
-    """Return the frequencies (Q,), over the carrier, at which array sums are computed: Chebyshev
-    points of the band.
+    """Return the frequencies (Q,), over the carrier, at which array sums are computed.
+
+    They are Chebyshev points of the band.
 
     Their number follows from the elements' paths relative to the array's middle. Without squint,
     array sums are those at the lowest subcarrier.

@@ -10,6 +10,8 @@ from lowalt.numerics.large_matrices import multiply
 
 LANES = 8
 """Numbers of double precision in the widest vector register."""
+LEAST_TURN = 1e-30
+"""Least angle off a lobe (turns), so that no sine of it is zero."""
 LOOPS = kernel(error_model="numpy")
 """As LEAN, for functions that allocate."""
 
@@ -35,13 +37,12 @@ class End(NamedTuple):
     """One station's array and its R paths to L points at N symbols.
 
     station: (3,) m; axes: (2,) horizontal axis (-sin Theta, cos Theta); counts: (2,) elements
-    across and up;
-    spacing: between elements (m); beam: f_k / f0; kappas: (Q,) frequencies over the carrier at
-    which array sums are taken; squint: whether they also set the phase of the array's middle;
-    turns: f_c / c, turns a metre of one way;
-    aims: (N, 2) direction cosines of the beam; places: (R, N, 3, L) m, images of the points;
-    coefficient: (R, N, L) complex; centre: (R, N) m, range to which excess ranges refer; gains: (R,
-    N, Q, L) complex array sums of spherical waves, without any entry for plane waves.
+    across and up; spacing: between elements (m); beam: f_k / f0; kappas: (Q,) frequencies over the
+    carrier at which array sums are taken; squint: whether they also set the phase of the array's
+    middle; turns: f_c / c, turns a metre of one way; aims: (N, 2) direction cosines of the beam;
+    places: (R, N, 3, L) m, images of the points; coefficient: (R, N, L) complex; centre: (R, N) m,
+    range to which excess ranges refer; gains: (R, N, Q, L) complex array sums of spherical waves,
+    without any entry for plane waves.
     """
 
     station: np.ndarray
@@ -61,8 +62,9 @@ class End(NamedTuple):
 
 @LEAN
 def row_sum(cosine, kappa, beam, aim, count, gain):
-    """Multiply gain (L,) by the sum of `count` elements in a row about their middle, sin(N pi x /
-    2) / sin(pi x / 2).
+    """Multiply gain (L,) by the sum of `count` elements in a row about their middle.
+
+    The sum is sin(N pi x / 2) / sin(pi x / 2).
 
     x = kappa times the direction cosine (L,), less beam times that of the aim; elements are half a
     wavelength apart.
@@ -74,7 +76,8 @@ def row_sum(cosine, kappa, beam, aim, count, gain):
         lobe = np.rint(2.0 * turns)
         sign = 1.0 - 2.0 * ((count - 1) % 2) * abs(lobe - 2.0 * np.rint(0.5 * lobe))
         off = turns - 0.5 * lobe
-        off = off if abs(off) > 1e-30 else 1e-30
+        if abs(off) <= LEAST_TURN:
+            off = LEAST_TURN
         _, single = phasor(off)
         _, every = phasor(count * off)
         gain[i] *= sign * every / single
@@ -82,8 +85,9 @@ def row_sum(cosine, kappa, beam, aim, count, gain):
 
 @INNER
 def _one_way(end, path, n, work, factors, excess):
-    """Fill factors (Q, 2, L) with coefficient, array sum, 1/r and half the two-way phase, and
-    excess (L,) with metres.
+    """Fill factors (Q, 2, L) and excess ranges (L,) of one end, by one path, at symbol n.
+
+    The factors are coefficient, array sum, 1/r and half the two-way phase; the excess is in metres.
 
     work: (3, L). Returns whether every point stands away from the station.
     """
@@ -97,7 +101,9 @@ def _one_way(end, path, n, work, factors, excess):
     up = work[1]
     weight = end.coefficient[path, n]
     for i in range(np.uint64(at.shape[1])):
-        x, y, z = at[0, i] - end.station[0], at[1, i] - end.station[1], at[2, i] - end.station[2]
+        x = at[0, i] - end.station[0]
+        y = at[1, i] - end.station[1]
+        z = at[2, i] - end.station[2]
         r = np.sqrt(x * x + y * y + z * z)
         clear &= r > 0.0
         inverse = 1.0 / r
@@ -112,7 +118,8 @@ def _one_way(end, path, n, work, factors, excess):
         c, s = phasor(turns - end.turns * excess[i])
         re = weight[i].real * inverse
         im = weight[i].imag * inverse
-        factors[0, 0, i], factors[0, 1, i] = re * c - im * s, re * s + im * c
+        factors[0, 0, i] = re * c - im * s
+        factors[0, 1, i] = re * s + im * c
     # Entry 0 holds the factor that all frequencies share, so it is overwritten last.
     for q in range(len(end.kappas) - 1, -1, -1):
         real = factors[q, 0]
@@ -155,15 +162,17 @@ def _tabulate(u, table):
 
 @INNER
 def _fill_moments(factors, strength, excess, reach, work, result):
-    """Fill result (Q, 2, P) with the sums over points of strength x factors x T_p(u), u = excess /
-    (2 reach).
+    """Fill result (Q, 2, P) with the sums over points of strength x factors x T_p(u).
+
+    u = excess / (2 reach).
 
     factors, excess: of the way out and of the way back, whose factors (Q, 2, L) multiply and whose
     excess ranges (L,) add; work: u (L,), polynomials (L, K), products (2 Q, L), sums (2 Q, K).
     Points are added in their order: vector registers hold several polynomials, so that the order
     does not depend on their width.
     """
-    (out, back), (excess_out, excess_back) = factors, excess
+    out, back = factors
+    excess_out, excess_back = excess
     u, table, products, sums = work
     scale = 0.5 / reach
     for i in range(np.uint64(len(u))):
@@ -192,12 +201,13 @@ def _fill_moments(factors, strength, excess, reach, work, result):
 
 @LOOPS
 def moments(out, back, same, strength, reach, result):
-    """Fill result (A, B, N, Q, 2, P) with the moments of every way out by path a and back by path
-    b.
+    """Fill result (A, B, N, Q, 2, P) with the moments of every way out and back.
+
+    Waves go out by path a and back by path b.
 
     out, back: `End`; same: whether both are the same array; then a, b also stands for b, a, and
-    only b >= a is filled;
-    strength: (A, B, N, L), real amplitudes; reach: m, bound of half the two-way excess ranges.
+    only b >= a is filled; strength: (A, B, N, L), real amplitudes; reach: m, bound of half the
+    two-way excess ranges.
     Returns 1 plus the number of the first symbol with a point in a station, 0 for none.
     """
     ways_out, ways_back, symbols, nodes, _, orders = result.shape
@@ -223,10 +233,14 @@ def moments(out, back, same, strength, reach, result):
             if not same and not _one_way(back, b, n, work, home[b], excess_home[b]):
                 return n + 1
         for a in range(ways_out):
-            for b in range(a if same else 0, ways_back):
-                homeward, excess = (
-                    (there[b], excess_there[b]) if same else (home[b], excess_home[b])
-                )
+            for b in range(ways_back):
+                if same and b < a:
+                    continue
+                homeward = home[b]
+                excess = excess_home[b]
+                if same:
+                    homeward = there[b]
+                    excess = excess_there[b]
                 amplitudes = strength[a % strength.shape[0], b % strength.shape[1], n]
                 factors = (there[a], homeward)
                 ranges = (excess_there[a], excess)
@@ -236,8 +250,9 @@ def moments(out, back, same, strength, reach, result):
 
 @LOOPS
 def add_turned(values, start, step, result):
-    """Add values exp(j 2 pi (start + (m - (M - 1) / 2) step)), start and step (N,) turns, to result
-    (N, M).
+    """Add values exp(j 2 pi (start + (m - (M - 1) / 2) step)) to result (N, M).
+
+    start, step: (N,) turns.
 
     values: (N, 2, M), real and imaginary parts.
     """

@@ -1,5 +1,6 @@
-"""Noise at set SNRs in a scene: added in all range cells before compression, or later, behind the
-scene's filters.
+"""Noise at set SNRs in a scene.
+
+It is added in all range cells before compression, or later, behind the scene's filters.
 """
 
 from collections.abc import Mapping
@@ -15,23 +16,26 @@ def white(rng: np.random.Generator, variance: float, shape: tuple[int, ...]) -> 
 
 
 def in_all_cells(effects: Mapping[str, dict | None]) -> list[str]:
-    """Return the names of those of a configuration's `effects` that add the noise of noise.snr_db
-    themselves, before range compression.
+    """Return the names of those effects that add the noise of noise.snr_db themselves.
+
+    effects: those of a configuration. The noise is added before range compression.
     """
     adding = called(offering(effects, "receiver", "SET_SNR"))
     return [effect.name for effect in adding if effect.snr_db is None]
 
 
 def filters(effects: Mapping[str, dict | None]) -> dict[str, dict]:
-    """Return those of a configuration's `effects` that filter range cells, and so the noise that is
-    added later.
+    """Return those effects that filter range cells, and so the noise that is added later.
+
+    effects: those of a configuration.
     """
     return offering(effects, "detection", "filtered")
 
 
 def behind(noise: np.ndarray, filters: Mapping[str, dict | None]) -> np.ndarray:
-    """Return noise (N,) of one range cell as these filters leave it: their spectrum is not
-    flat.
+    """Return noise (N,) of one range cell as these filters leave it.
+
+    Its spectrum is then not flat.
 
     Filters are linear and act on each range cell by itself, so this is the noise that the cell
     would hold if it had been there before. A pulse canceller shapes it as |2 sin(pi f T_r)|^(2 k)

@@ -1,10 +1,10 @@
-"""Array sums of spherical waves at many points, interpolated from exact sums at a few directions
-and ranges.
+"""Array sums of spherical waves at many points, interpolated from a few exact ones.
+
+The exact sums are those at a few directions and ranges.
 
 During a few symbols, a target fills a small box of direction cosines and inverse ranges. Over this
-box an array sum is
-smooth: a polynomial of a few dozen terms takes less time than a sum over all elements, each at its
-own distance.
+box an array sum is smooth: a polynomial of a few dozen terms takes less time than a sum over all
+elements, each at its own distance.
 """
 
 from itertools import pairwise
@@ -24,8 +24,9 @@ SYMBOLS = 600
 
 
 def gains(end: End, error: float) -> np.ndarray:
-    """Return the array sums (R, N, Q, L) of spherical waves, without the factor 1/r and the
-    middle's phase.
+    """Return the array sums (R, N, Q, L) of spherical waves.
+
+    The factor 1/r and the middle's phase are left out.
 
     error: largest error relative to the number of elements. Source: Balanis, Antenna Theory, 4th
     ed. 2016, 4.4.1.
@@ -36,40 +37,50 @@ def gains(end: End, error: float) -> np.ndarray:
     edges = np.unique(np.concatenate([np.arange(0, symbols, SYMBOLS), turned, [symbols]]))
     for path in range(paths):
         for first, last in pairwise(edges):
-            at = np.empty((last - first, 3, points))
-            low, high = np.empty((2, 3))
-            _directions(end, end.places[path, first:last], at, low, high)
-            middle = 0.5 * (low + high)
-            half = np.maximum(0.5 * (high - low), 1e-12 * np.array([1.0, 1.0, high[2]]))
-            counts = _orders(end, middle, half, error)
             out = result[path, first:last]
-            if counts is None or np.prod(counts) > at[:, 0].size:
-                _sums(end, first, at, out)
-                continue
-            nodes = np.stack(np.meshgrid(*map(chebyshev_points, counts), indexing="ij"))
-            grid = middle[:, None] + half[:, None] * nodes.reshape(3, -1)
-            values = np.empty((1, len(end.kappas), grid.shape[1]), np.complex128)
-            _sums(end, first, grid[None], values)
-            # The cosine transform counts the terms of order 0 twice on each axis.
-            terms = fft.dctn(values.reshape(-1, *counts), axes=(1, 2, 3)) / np.prod(counts)
-            for axis in (1, 2, 3):
-                np.moveaxis(terms, axis, 0)[0] *= 0.5
-            terms = terms.reshape(len(terms), -1)
-            # Leave out terms whose sum is negligible at every frequency.
-            size = abs(terms).max(axis=0)
-            order = np.argsort(size)
-            kept = order[np.cumsum(size[order]) > error * np.prod(end.counts)]
-            powers = np.stack(np.unravel_index(kept, counts), axis=1)
-            parts = np.concatenate([terms[:, kept].real, terms[:, kept].imag])
-            _polynomials(at, (middle, half), counts, powers, parts, out)
+            _fill_gains(end, end.places[path, first:last], first, error, out)
     return result
+
+
+def _fill_gains(end: End, places: np.ndarray, first: int, error: float, out: np.ndarray) -> None:
+    """Fill out (K, Q, L) with the sums toward places (K, 3, L) of symbols that share a box.
+
+    first: number of the first of these symbols, whose beam all have.
+    """
+    at = np.empty(places.shape)
+    low = np.empty(3)
+    high = np.empty(3)
+    _directions(end, places, at, low, high)
+    middle = 0.5 * (low + high)
+    half = np.maximum(0.5 * (high - low), 1e-12 * np.array([1.0, 1.0, high[2]]))
+    counts = _orders(end, middle, half, error)
+    if counts is None or np.prod(counts) > at[:, 0].size:
+        _sums(end, first, at, out)
+        return
+    nodes = np.stack(np.meshgrid(*map(chebyshev_points, counts), indexing="ij"))
+    grid = middle[:, None] + half[:, None] * nodes.reshape(3, -1)
+    values = np.empty((1, len(end.kappas), grid.shape[1]), np.complex128)
+    _sums(end, first, grid[None], values)
+    # The cosine transform counts the terms of order 0 twice on each axis.
+    terms = fft.dctn(values.reshape(-1, *counts), axes=(1, 2, 3)) / np.prod(counts)
+    for axis in (1, 2, 3):
+        np.moveaxis(terms, axis, 0)[0] *= 0.5
+    terms = terms.reshape(len(terms), -1)
+    # Leave out terms whose sum is negligible at every frequency.
+    size = abs(terms).max(axis=0)
+    order = np.argsort(size)
+    kept = order[np.cumsum(size[order]) > error * np.prod(end.counts)]
+    powers = np.stack(np.unravel_index(kept, counts), axis=1)
+    real_imag = np.concatenate([terms[:, kept].real, terms[:, kept].imag])
+    _polynomials(at, (middle, half), counts, powers, real_imag, out)
 
 
 def _orders(
     end: End, middle: np.ndarray, half: np.ndarray, error: float
 ) -> tuple[int, int, int] | None:
-    """Polynomials per axis (across, up, inverse range) that the sums in a box need; None if it is
-    close to the array.
+    """Return how many polynomials per axis the sums in a box need.
+
+    The axes are across, up and inverse range. The result is None if the box is close to the array.
 
     The phase of an element at distance D from the array's corner changes by k D per unit of a
     direction cosine, and by k D^2 / 2 per unit of inverse range. A third more allows for the mixed
@@ -81,34 +92,41 @@ def _orders(
     if nearness > 0.25:
         return None
     wave = 2.0 * np.pi * 2.0 * end.turns
-    spread = wave * np.array(
-        [0.5 * wide + diagonal * nearness, 0.5 * tall + diagonal * nearness, 0.5 * diagonal**2]
-    )
-    return tuple(orders_of(argument, 0.1 * error) + 1 for argument in 1.33 * spread * half + 1e-6)
+    across = 0.5 * wide + diagonal * nearness
+    up = 0.5 * tall + diagonal * nearness
+    along = 0.5 * diagonal**2
+    arguments = 1.33 * (wave * np.array([across, up, along])) * half + 1e-6
+    for_across, for_up, for_along = (orders_of(each, 0.1 * error) + 1 for each in arguments)
+    return for_across, for_up, for_along
 
 
 @LOOPS
 def _directions(end, places, at, low, high):
-    """Fill at (K, 3, L) with direction cosines and inverse ranges of places (K, 3, L); low, high
-    (3,): bounds.
+    """Fill at (K, 3, L) with direction cosines and inverse ranges of places (K, 3, L).
+
+    low, high: (3,), their bounds.
     """
     low[:] = np.inf
     high[:] = -np.inf
     for n in range(len(places)):
         for i in range(places.shape[2]):
-            x, y = places[n, 0, i] - end.station[0], places[n, 1, i] - end.station[1]
+            x = places[n, 0, i] - end.station[0]
+            y = places[n, 1, i] - end.station[1]
             z = places[n, 2, i] - end.station[2]
             inverse = 1.0 / np.sqrt(x * x + y * y + z * z)
-            at[n, 0, i], at[n, 1, i] = (end.axes[0] * x + end.axes[1] * y) * inverse, z * inverse
+            at[n, 0, i] = (end.axes[0] * x + end.axes[1] * y) * inverse
+            at[n, 1, i] = z * inverse
             at[n, 2, i] = inverse
             for k in range(3):
-                low[k], high[k] = min(low[k], at[n, k, i]), max(high[k], at[n, k, i])
+                low[k] = min(low[k], at[n, k, i])
+                high[k] = max(high[k], at[n, k, i])
 
 
 @LOOPS
 def _sums(end, symbol, at, result):
-    """Fill result (K, Q, L) with the sums over elements at directions and inverse ranges at (K, 3,
-    L).
+    """Fill result (K, Q, L) with the sums over elements at given directions.
+
+    at: (K, 3, L), direction cosines and inverse ranges.
 
     An element at e from the corner is sqrt(r^2 - 2 r e.u + e^2) away. Its weight has the beam of
     `symbol`.
@@ -126,7 +144,8 @@ def _sums(end, symbol, at, result):
             imag[:] = 0.0
             for a in range(end.counts[0]):
                 for b in range(end.counts[1]):
-                    x, y = end.spacing * a, end.spacing * b
+                    x = end.spacing * a
+                    y = end.spacing * b
                     beam = end.beam * ((a - h) * aims[0] + (b - v) * aims[1])
                     for i in range(np.uint64(len(real))):
                         # (distance - r) / r, without cancellation far away.
@@ -146,8 +165,9 @@ def _sums(end, symbol, at, result):
 
 @INNER
 def _scaled(values, middle, half, table):
-    """Fill table (K, L) with the Chebyshev polynomials of (values - middle) / half; at most L
-    values.
+    """Fill table (K, L) with the Chebyshev polynomials of (values - middle) / half.
+
+    There are at most L values.
     """
     for i in range(np.uint64(len(values))):
         table[0, i] = 1.0
@@ -165,14 +185,16 @@ def _scaled(values, middle, half, table):
 
 @LOOPS
 def _polynomials(at, box, counts, powers, terms, result):
-    """Fill result (K, Q, L) with sums of polynomials of directions and inverse ranges at (K, 3, L),
-    powers (T, 3).
+    """Fill result (K, Q, L) with sums of polynomials of directions and inverse ranges.
+
+    at: (K, 3, L), these; powers: (T, 3), of each term on the three axes.
 
     terms: (2 Q, T), the factors' real parts at every frequency, then their imaginary parts.
     """
     # Chunks of nearly equal size, because the last one is also computed at full size.
     chunks = (at.shape[2] + CHUNK - 1) // CHUNK
-    size, (middle, half) = (at.shape[2] + chunks - 1) // chunks, box
+    size = (at.shape[2] + chunks - 1) // chunks
+    middle, half = box
     across = np.zeros((counts[0], size))
     up = np.zeros((counts[1], size))
     near = np.zeros((counts[2], size))

@@ -1,4 +1,4 @@
-"""What only the user may choose of a scene's effects: code of their own, and files that they read."""
+"""What only the user may choose of a scene's effects: own code, and files that effects read."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -9,8 +9,9 @@ from lowalt.scene.effects import complete
 
 
 def refuse_effects(effects: Mapping[str, dict | None], where: str | Path) -> None:
-    """Refuse effects of the user's own, and files that effects read, in what may be a stranger's
-    file or folder.
+    """Refuse effects of the user's own, and files that effects read.
+
+    They stand in what may be a stranger's file or folder.
 
     No code that the block names is run, and no file is read. Raises: InputError naming the effect.
     """

@@ -1,5 +1,6 @@
-"""What is true of a target in a look: where it is (geometric truth) and where its echo appears
-(observed truth).
+"""What is true of a target in a look.
+
+Where it is (geometric truth) and where its echo appears (observed truth).
 
 The echo of a target at range r turns by 2 f r / c at the effective carrier f, less the phase of the
 arrays' middles, since elements are counted from the one at the station's place. An effect that
@@ -45,44 +46,51 @@ def middle_of(view: View) -> np.ndarray:
 
 
 def geometric(view: View) -> np.ndarray:
-    """Return range (m), radial speed (m/s) and direction cosines of the target's middle at each
-    symbol, (N, 4).
+    """Return range (m), radial speed (m/s) and direction cosines at each symbol, (N, 4).
+
+    They are those of the target's middle.
     """
     station = view.station
     middle = middle_of(view)
     moved = rate(middle_of, view)
-    ends = [station] if station.transmitter is None else [station, station.transmitter]
-    ways = [middle - np.asarray(end.position_m) for end in ends]
-    ranges = [portable.norm(way) for way in ways]
-    speeds = [(way * moved).sum(axis=1) / length for way, length in zip(ways, ranges, strict=True)]
-    return np.column_stack(
-        [np.mean(ranges, axis=0), np.mean(speeds, axis=0), cosines(station, middle)]
-    )
+    ends = [station]
+    if station.transmitter is not None:
+        ends.append(station.transmitter)
+    ranges = []
+    speeds = []
+    for end in ends:
+        way = middle - np.asarray(end.position_m)
+        length = portable.norm(way)
+        ranges.append(length)
+        speeds.append((way * moved).sum(axis=1) / length)
+    range_m = np.mean(ranges, axis=0)
+    radial_mps = np.mean(speeds, axis=0)
+    return np.column_stack([range_m, radial_mps, cosines(station, middle)])
 
 
 def array_turns(view: View) -> np.ndarray:
-    """Return the turns (N,) of phase by which the arrays' middles hear a target's middle before
-    their first elements.
+    """Return the turns (N,) of phase by which the arrays' middles hear a target's middle first.
+
+    They are counted against their first elements.
 
     Elements are half a wavelength of the carrier apart. Source: paper, Eq. 3 and 4.
     """
     network = view.network
     station = view.station
-    middle = view.places.mean(axis=1)
+    middle = middle_of(view)
     kappa = station.frequency_hz / network.carrier_hz
     sender = station.transmitter or station
-    ends = (sender, network.transmit), (station, network.receive)
-    return sum(
-        0.25 * kappa * portable.dot(cosines(end, middle), np.array(shape) - 1.0)
-        for end, shape in ends
-    )
+    sent = portable.dot(cosines(sender, middle), np.array(network.transmit) - 1.0)
+    received = portable.dot(cosines(station, middle), np.array(network.receive) - 1.0)
+    return 0.25 * kappa * sent + 0.25 * kappa * received
 
 
 def observed(
     view: View, displacements: Iterable[Displacement], cells: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the range cell (N,), 0 to `cells` with its fraction, and the folded speed (N,) m/s of
-    an echo.
+    """Return the range cell (N,) and the folded speed (N,) m/s of an echo.
+
+    The cell is 0 to `cells`, with its fraction.
 
     The echo is that of the middle of a view's target on the direct path, moved by the effects'
     displacements.
@@ -102,15 +110,16 @@ def observed(
     for displacement in displacements:
         way_m = way_m + SPEED_OF_LIGHT * displacement.delay_s
         doppler_hz = doppler_hz + displacement.rise_hz
-    return way_m / (2 * network.cell_m) % cells, network.folded_mps(
-        -doppler_hz * wavelength_m / 2, station
-    )
+    cell = way_m / (2 * network.cell_m) % cells
+    speed_mps = -doppler_hz * wavelength_m / 2
+    return cell, network.folded_mps(speed_mps, station)
 
 
 def of_parts(view: View) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the range (N, P) m of the middle of each of a target's parts, and the lowest and the
-    highest radial speed (N, P) m/s of its points at each symbol, not folded, positive away from the
-    station.
+    """Return ranges (N, P) m, and lowest and highest radial speeds (N, P) m/s of a target's parts.
+
+    The ranges are those of the parts' middles, the speeds those of their points at each symbol, not
+    folded, positive away from the station.
 
     Rotors turn far between two symbols, so speeds are taken over twice STEP_S.
     """
@@ -118,7 +127,12 @@ def of_parts(view: View) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     after = view.ways_m(view.at(view.times_s + STEP_S).places)
     # Ways are there and back.
     speeds = (after - before) / (4 * STEP_S)
-    parts = [view.cloud.part == part for part in range(len(view.cloud.names))]
-    ranges = [view.ways_m(view.places[:, part].mean(axis=1)) / 2 for part in parts]
-    low, high = ([bound(speeds[:, part], axis=1) for part in parts] for bound in (np.min, np.max))
-    return tuple(np.stack(columns, axis=1) for columns in (ranges, low, high))
+    ranges = []
+    lowest = []
+    highest = []
+    for part in range(len(view.cloud.names)):
+        mine = view.cloud.part == part
+        ranges.append(view.ways_m(view.places[:, mine].mean(axis=1)) / 2)
+        lowest.append(speeds[:, mine].min(axis=1))
+        highest.append(speeds[:, mine].max(axis=1))
+    return np.stack(ranges, axis=1), np.stack(lowest, axis=1), np.stack(highest, axis=1)

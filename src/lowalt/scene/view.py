@@ -1,5 +1,6 @@
-"""One moving target as one station sees it: where its parts and points stand at each instant, where
-beams point.
+"""One moving target as one station sees it.
+
+Where its parts and points stand at each instant, and where beams point.
 """
 
 from collections.abc import Mapping
@@ -19,8 +20,9 @@ from lowalt.targets.cloud import Cloud
 
 
 class Beams(NamedTuple):
-    """Where a station's beams point: at aims_m (K, 3) m, each from starts_s (K,) s on, rising from
-    0.
+    """Where a station's beams point.
+
+    starts_s: (K,), rising from 0; aims_m: (K, 3), each from its start on.
     """
 
     starts_s: np.ndarray
@@ -35,8 +37,9 @@ class Sampling(NamedTuple):
 
 
 class Displacement(NamedTuple):
-    """Delay (s) and frequency shift (Hz) with which an effect lets an echo appear: a number, or one
-    per symbol (N,).
+    """Delay (s) and frequency shift (Hz) with which an effect lets an echo appear.
+
+    Each is a number, or one per symbol (N,).
     """
 
     delay_s: np.ndarray | float = 0.0
@@ -61,8 +64,9 @@ class Perturbations(NamedTuple):
     changes: tuple[Perturbation, ...]
 
     def at(self, times_s: np.ndarray) -> Perturbation | None:
-        """Return their sum at times_s (K,) s, linear between the instants given and exact on them;
-        None for none.
+        """Return their sum at times_s (K,) s.
+
+        It is linear between the instants given and exact on them; None for none.
         """
         if not self.changes:
             return None
@@ -70,23 +74,27 @@ class Perturbations(NamedTuple):
         for change in self.changes:
             for part, angle in (change.angle_rad or {}).items():
                 angles[part] = angles.get(part, 0.0) + np.interp(times_s, self.grid_s, angle)
-        return Perturbation(
-            angles, self._total("offset_m", times_s), self._total("tilt_rad", times_s)
-        )
+        offset_m = self._total("offset_m", times_s)
+        return Perturbation(angles, offset_m, self._total("tilt_rad", times_s))
 
     def _total(self, name: str, times_s: np.ndarray) -> np.ndarray | None:
         """The sum (K, 3) of those of the changes' tables (G, 3) that there are, None for none."""
-        tables = [table for change in self.changes if (table := getattr(change, name)) is not None]
-        interpolated = [
-            [np.interp(times_s, self.grid_s, column) for column in table.T] for table in tables
-        ]
-        return sum(np.stack(columns, axis=1) for columns in interpolated) if interpolated else None
+        result = None
+        for change in self.changes:
+            table = getattr(change, name)
+            if table is None:
+                continue
+            columns = [np.interp(times_s, self.grid_s, column) for column in table.T]
+            interpolated = np.stack(columns, axis=1)
+            result = interpolated if result is None else result + interpolated
+        return result
 
 
 @LEAN
 def _carry(rotation, translation, vectors, part, result):
-    """Fill result (N, 3, L) with rotation (N, P, 3, 3) times vectors (3, L) plus translation (N, P,
-    3), by part.
+    """Fill result (N, 3, L) with vectors (3, L) turned and moved, by part.
+
+    rotation: (N, P, 3, 3); translation: (N, P, 3), which is added.
     """
     # Points of a part stand next to each other.
     first = 0
@@ -109,22 +117,29 @@ def _carry(rotation, translation, vectors, part, result):
 
 
 def _carried(vectors: np.ndarray, motion: Rigid, translation: np.ndarray) -> np.ndarray:
-    """Vectors (L, 3) of the parts' own frames in the global frame, moved by translation (N, P, 3)
-    m: (N, L, 3).
+    """Return vectors (L, 3) of the parts' own frames in the global frame: (N, L, 3).
+
+    translation: (N, P, 3) m, which is added.
 
     Coordinates of a symbol's points stand together in memory, (N, 3, L).
     """
     result = np.empty((len(motion.rotation), 3, len(vectors)))
-    part = np.asarray(motion.part, np.int64)
-    _carry(*map(np.ascontiguousarray, (motion.rotation, translation, vectors.T)), part, result)
+    _carry(
+        np.ascontiguousarray(motion.rotation),
+        np.ascontiguousarray(translation),
+        np.ascontiguousarray(vectors.T),
+        np.asarray(motion.part, np.int64),
+        result,
+    )
     return result.swapaxes(1, 2)
 
 
 def located(
     cloud: Cloud, row: dict, times_s: np.ndarray, moved: Perturbations
 ) -> tuple[Rigid, np.ndarray]:
-    """Return the poses of a target's parts and the places (N, L, 3) m of its points at times_s (N,)
-    s, global frame.
+    """Return the poses of a target's parts and the places (N, L, 3) m of its points, global frame.
+
+    times_s: (N,).
 
     The nodes of a recording have places but no attitude. Raises: InputError as
     `lowalt.motion.poses.poses`.
@@ -133,6 +148,12 @@ def located(
     if "node" in cloud.kinds:
         return motion, np.ascontiguousarray(motion.translation.swapaxes(1, 2)).swapaxes(1, 2)
     return motion, _carried(cloud.points, motion, motion.translation)
+
+
+def _stood(station: Station, place_m: np.ndarray) -> Station:
+    """The same station at another place (3,) m."""
+    x, y, z = map(float, place_m)
+    return replace(station, position_m=(x, y, z))
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,8 +175,9 @@ class View:
     moved: Perturbations
     """What the motion effects add to the target's motion."""
     origin_m: np.ndarray
-    """(3,) m, the labelled target's origin at the first symbol: beams point there, or as `beams`
-    says.
+    """(3,) m, the labelled target's origin at the first symbol.
+
+    Beams point there, or as `beams` says.
     """
     beams: Mapping[str, Beams] = field(default_factory=dict)
     """Where stations' beams point, by their names."""
@@ -184,8 +206,9 @@ class View:
 
     @property
     def aim_m(self) -> np.ndarray:
-        """Where the receiver's beams point at first, (3,) m: without pointing errors the target's
-        origin.
+        """Where the receiver's beams point at first, (3,) m.
+
+        Without pointing errors this is the target's origin.
         """
         return self.aim_of(self.station)
 
@@ -197,11 +220,13 @@ class View:
 
     def ways_m(self, places: np.ndarray) -> np.ndarray:
         """Return the way from the sender by places (..., 3) m to the receiver, (...) m."""
-        return sum(portable.norm(places - mast_m) for mast_m in self.masts_m)
+        sender_m, receiver_m = self.masts_m
+        return portable.norm(places - sender_m) + portable.norm(places - receiver_m)
 
     def relative_gain(self, images: np.ndarray) -> np.ndarray | float:
-        """Return the element's amplitude gain toward images (N, L, 3) over that toward the points,
-        (N, L) or 1.
+        """Return the element's amplitude gain toward images (N, L, 3), over that toward the points.
+
+        The result is (N, L) or 1.
         """
         if self.element is None:
             return 1.0
@@ -210,6 +235,7 @@ class View:
     @cached_property
     def _gain(self) -> np.ndarray:
         """The element's power gain (N, L) toward the points."""
+        assert self.element is not None  # as `relative_gain` has asked
         return gain(self.element, self.station, self.places)
 
     def at(self, times_s: np.ndarray) -> "View":
@@ -218,31 +244,32 @@ class View:
         return replace(self, times_s=times_s, motion=motion, places=places)
 
     def of(self, station: Station) -> "View":
-        """Return the same target, at the same instants and under the same beams, as another station
-        hears it.
+        """Return the same target as another station hears it.
+
+        Instants and beams stay the same.
         """
         return replace(self, station=station)
 
     def seen_from(self, place_m: np.ndarray, sender_m: np.ndarray | None = None) -> "View":
-        """Return the same target, at the same instants and under the same beams, seen from another
-        place (3,) m.
+        """Return the same target seen from another place (3,) m.
+
+        Instants and beams stay the same.
 
         sender_m: (3,) m, on a link where its sender stands then, None for where it stands.
         """
-        station = replace(self.station, position_m=tuple(float(value) for value in place_m))
+        station = _stood(self.station, place_m)
         if sender_m is not None:
-            sender = replace(
-                station.transmitter, position_m=tuple(float(value) for value in sender_m)
-            )
-            station = replace(station, transmitter=sender)
+            assert station.transmitter is not None  # a link has one
+            station = replace(station, transmitter=_stood(station.transmitter, sender_m))
         return self.of(station)
 
     def ends(self) -> list["View"]:
-        """Return the target as the sender and as the receiver of a link see it alone; a station's
-        own view is both.
+        """Return the target as the sender and as the receiver of a link see it alone.
+
+        A station's own view is both.
         """
         link = self.station
-        if link.transmitter is None:
+        if link.transmitter is None or link.receiver is None:
             return [self]
         hears = replace(link, name=link.receiver.name, transmitter=None, receiver=None)
         return [self.of(link.transmitter), self.of(hears)]

@@ -22,8 +22,9 @@ NORMAL_PREFIX = 144 / 2048
 
 
 def qpsk(rng: np.random.Generator, symbols: int, subcarriers: int) -> np.ndarray:
-    """Return random QPSK data (symbols, subcarriers) complex128 of unit modulus, all four values
-    equally likely.
+    """Return random QPSK data (symbols, subcarriers) complex128 of unit modulus.
+
+    All four values are equally likely.
 
     Source: paper, Eq. 5, whose data symbols have unit power; 3GPP TS 38.211, 5.1.3 (QPSK).
     """
@@ -34,8 +35,9 @@ def qpsk(rng: np.random.Generator, symbols: int, subcarriers: int) -> np.ndarray
 
 
 def transmit(response: np.ndarray, data: np.ndarray | None) -> np.ndarray:
-    """Return the received time samples (N, M) of frequency responses (N, M) that carried `data` (N,
-    M).
+    """Return the received time samples (N, M) of frequency responses (N, M).
+
+    data: (N, M), which they carried.
 
     Sample i is (1/M) sum_m response[m] data[m] exp(j 2 pi (m - M // 2) i / M), so its 2-norm is 1 /
     sqrt(M) of the response's; without data it is response[i] / sqrt(M). Source: 3GPP TS 38.211,
@@ -47,8 +49,9 @@ def transmit(response: np.ndarray, data: np.ndarray | None) -> np.ndarray:
 
 
 def demodulate(samples: np.ndarray, data: np.ndarray | None) -> np.ndarray:
-    """Return the responses (N, M) of time samples (N, M) that carried `data` (N, M): the inverse of
-    `transmit`.
+    """Return the responses (N, M) of time samples (N, M).
+
+    data: (N, M), which they carried. This is the inverse of `transmit`.
 
     The division is by the sent symbol s; the paper's Eq. 24 would need its conjugate. The response
     alone remains.
@@ -59,24 +62,27 @@ def demodulate(samples: np.ndarray, data: np.ndarray | None) -> np.ndarray:
 
 
 def range_cells(response: np.ndarray) -> np.ndarray:
-    """Return the range cells (N, M) of frequency responses (N, M), the inverse transform over
-    subcarriers.
+    """Return the range cells (N, M) of frequency responses (N, M).
+
+    They are the inverse transform over subcarriers.
     """
     return fft.ifft(response, axis=-1)
 
 
 def prefix_length_s(prefix_s: float | None, network: Network) -> float:
     """Return the cyclic prefix's length (s): the given one, or NR's normal prefix."""
-    return NORMAL_PREFIX / network.subcarrier_spacing_hz if prefix_s is None else prefix_s
+    if prefix_s is None:
+        return NORMAL_PREFIX / network.subcarrier_spacing_hz
+    return prefix_s
 
 
 def baseband_hz(network: Network) -> np.ndarray:
-    """Return each subcarrier's frequency from the local oscillator, (m - M // 2) df (Hz), shape
-    (M,).
+    """Return each subcarrier's frequency from the local oscillator, (m - M // 2) df (Hz).
+
+    The shape is (M,).
     """
-    return (
-        np.arange(network.subcarriers) - network.subcarriers // 2
-    ) * network.subcarrier_spacing_hz
+    number = np.arange(network.subcarriers) - network.subcarriers // 2
+    return number * network.subcarrier_spacing_hz
 
 
 def oscillator_hz(network: Network, station: Station) -> float:
@@ -91,8 +97,9 @@ def windowed(
     late: int,
     on_air: Callable[[str], np.ndarray | None],
 ) -> np.ndarray:
-    """Return the time samples (N, M) of a response (N, M) whose first `late` samples are still the
-    previous symbol's.
+    """Return the time samples (N, M) of a response (N, M) with samples of another symbol.
+
+    Its first `late` samples are still the previous symbol's.
 
     late: negative where the last samples are the next symbol's already; on_air: subcarriers (N, M)
     on the air in the "waveform", the "previous waveform" and the "next waveform". The previous

@@ -1,5 +1,4 @@
-"""`python -m lowalt.shards write | index`: pack samples into a shard, list the shards of a data
-set.
+"""`python -m lowalt.shards write | index`: pack samples into a shard, list a data set's shards.
 
 `lowalt verify` and `lowalt remake` check what was packed.
 """
@@ -55,7 +54,7 @@ def write(arguments: list[str]) -> None:
         type=int,
         default=(0, 1),
         metavar=("NUMBER", "COUNT"),
-        help="the shard's place among the shards of the fold",
+        help="the shard's number among the shards of the fold, and their count",
     )
     line.add_argument(
         "--out", required=True, help="shard to write (.tar); its table is the .npz next to it"
@@ -69,12 +68,8 @@ def write(arguments: list[str]) -> None:
     seed, network, snrs, split, shards = pick(
         settings, "seed", "network", "snr_db", "split", "shards"
     )
-    kind, _, cells = pick(
-        {"largest_mb": None, "cells": cell_type({"shards": shards}), **shards},
-        "kind",
-        "largest_mb",
-        "cells",
-    )
+    stated_or_default = {"largest_mb": None, "cells": cell_type({"shards": shards}), **shards}
+    kind, _, cells = pick(stated_or_default, "kind", "largest_mb", "cells")
     if not 0 <= options.piece[0] < options.piece[1]:
         raise InputError(f"--piece: {options.piece}, expected 0 <= NUMBER < COUNT")
     if kind not in KINDS:
@@ -90,9 +85,8 @@ def write(arguments: list[str]) -> None:
         content, powers = clean_content(options.echoes, options.powers, network, len(rows))
     elif kind == "cube":
         clouds = {cloud.subtype: cloud for cloud in map(read_cloud, options.clouds)}
-        cubes = Cubes.from_settings(
-            scene, clouds, read_all(options.occluders) if options.occluders else None
-        )
+        occluders = read_all(options.occluders) if options.occluders else None
+        cubes = Cubes.from_settings(scene, clouds, occluders)
         content = cube_content(options.signals, cubes, rows, snrs, cells)
     else:
         content = noisy_content(
@@ -103,9 +97,7 @@ def write(arguments: list[str]) -> None:
 
 
 def _classes(settings: dict) -> tuple[str, ...]:
-    """Remove the classes from a command's settings and return them: the published ones if the
-    settings name none.
-    """
+    """Remove the classes from a command's settings and return them: by default the published."""
     classes = stated(settings)
     settings.pop("classes", None)
     return classes

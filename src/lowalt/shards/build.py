@@ -1,5 +1,4 @@
-"""Writes a whole data set from its configuration and clouds in one process, with the same bytes as
-the workflow.
+"""Writes a whole data set in one process, with the same bytes as the workflow.
 
 `python -m lowalt.shards.build` writes clouds, motion tables and shards; echoes are only kept in
 memory.
@@ -11,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from lowalt.config.brought import OF_TRAINING
 from lowalt.config.command import run
 from lowalt.config.layers import SCHEMA, load
 from lowalt.files.atomic import slug
@@ -26,9 +26,9 @@ from lowalt.targets.cloud import write as write_cloud
 
 
 def write_run(dataset: Dataset, folder: str | Path, kind: str, clouds: bool = True) -> dict:
-    """Write the shards of all groups and folds of a data set, its motion tables and clouds below
-    `folder`, as the workflow does; return the index.
+    """Write all shards of a data set, its motion tables and clouds; return the index.
 
+    The files lie below `folder` as the workflow writes them.
     kind: "image", "signal", "recipe" or "cube"; clouds: whether cloud files are written too.
     Raises: InputError naming the sample that cannot be computed.
     """
@@ -50,13 +50,13 @@ def write_run(dataset: Dataset, folder: str | Path, kind: str, clouds: bool = Tr
 
 def rows_of(dataset: Dataset, chunk: str) -> list[dict]:
     """Return the motion table of one chunk."""
-    group, (first, count) = chunk.partition("-")[0], dataset.plan.span(chunk)
-    places = [
-        Place(group, subtype, model, 0.0)
-        for model in range(first, first + count)
-        for subtype in dataset.plan.chunk(chunk).members
-    ]
-    return [dataset.row(place) for place in places]
+    group, _, _ = chunk.partition("-")
+    first, count = dataset.plan.span(chunk)
+    rows = []
+    for model in range(first, first + count):
+        for subtype in dataset.plan.chunk(chunk).members:
+            rows.append(dataset.row(Place(group, subtype, model, 0.0)))
+    return rows
 
 
 def write_chunk(dataset: Dataset, folder: Path, chunk: str, kind: str) -> list[Path]:
@@ -74,14 +74,16 @@ def write_chunk(dataset: Dataset, folder: Path, chunk: str, kind: str) -> list[P
     maker.kept = len(rows)
 
     def content(number: int, level: int) -> tuple[bytes, dict]:
-        """Data of one sample (row `number` at SNR `level` of the chunk), and the part of its record
-        about cubes.
+        """Data of one sample, and what its record says of cubes.
+
+        number: of its row of the chunk; level: index of its SNR.
         """
+        row = rows[number]
         if kind == "recipe":
-            return npy(maker.received(rows[number])[0]), {}
-        return maker.data(
-            kind, maker.signal(rows[number], levels[level]), rows[number], levels[level], cells
-        )
+            echoes, _ = maker.received(row)
+            return npy(echoes), {}
+        snr_db = levels[level]
+        return maker.data(kind, maker.signal(row, snr_db), row, snr_db, cells)
 
     powers = None
     effects = maker.echo["effects"]
@@ -122,7 +124,8 @@ def main(arguments: list[str]) -> None:
     line.add_argument("--clouds", help="folder of finished cloud files (default: clouds are made)")
     line.add_argument("--out", required=True, help="folder to write into")
     options = line.parse_args(arguments)
-    dataset = Dataset(load(options.config, SCHEMA), options.clouds, inputs=options.inputs)
+    config = load(options.config, SCHEMA, unused=("inputs", *OF_TRAINING))
+    dataset = Dataset(config, options.clouds, inputs=options.inputs)
     write_run(dataset, options.out, dataset.config["shards"]["kind"])
 
 

@@ -1,5 +1,4 @@
-"""The data card, which makes the folder of the index publishable: README.md, samples.csv,
-croissant.json, SHA256SUMS.
+"""The data card: README.md, samples.csv, croissant.json and SHA256SUMS next to the index.
 
 `python -m lowalt.shards.card` is a separate command, so that a change of wording does not re-pack
 shards.
@@ -12,6 +11,7 @@ from collections import Counter
 from collections.abc import Iterator
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import NamedTuple
 
 import jinja2
 import yaml
@@ -51,8 +51,10 @@ WHAT = {
 
 def _table(header: tuple[str, ...], rows: list[tuple]) -> str:
     """Return a Markdown table."""
-    lines = [header, tuple("---" for _ in header), *rows]
-    return "\n".join("| " + " | ".join(str(cell) for cell in line) + " |" for line in lines) + "\n"
+    text = ""
+    for line in [header, tuple("---" for _ in header), *rows]:
+        text += "| " + " | ".join(str(cell) for cell in line) + " |\n"
+    return text
 
 
 def _slug(key: str) -> str:
@@ -60,86 +62,91 @@ def _slug(key: str) -> str:
 
     Raises: InputError naming a key of another form.
     """
-    parts = SLUG.match(key)
-    if parts is None:
+    match = SLUG.match(key)
+    if match is None:
         raise InputError(f"sample key {key!r}: expected SUBTYPE-MODEL-snrSNR")
-    return parts[1]
+    return match[1]
 
 
-def _census(shards: ShardSet) -> tuple[dict[str, dict], Counter, Counter]:
-    """Return a record of each subtype by its slug, and the counts of samples by slug and by SNR
-    (dB).
+class Census(NamedTuple):
+    """The subtypes of a data set: a record of each by its slug, and counts of samples.
+
+    subtypes: counts by slug; snrs: counts by SNR (dB).
     """
+
+    records: dict[str, dict]
+    subtypes: Counter
+    snrs: Counter
+
+
+def _census(shards: ShardSet) -> Census:
+    """Count the samples of a data set, and read a record of each subtype."""
     first: dict[str, int] = {}
     subtypes: Counter = Counter()
     snrs: Counter = Counter()
     start = 0
     for _, table in shards.tables():
         slugs = [_slug(key.decode()) for key in table["key"].tolist()]
-        for place, slug in enumerate(slugs, start):
-            first.setdefault(slug, place)
+        for number, slug in enumerate(slugs, start):
+            first.setdefault(slug, number)
         subtypes.update(slugs)
         snrs.update(table["snr_db"].astype(float).tolist())
         start += len(table)
-    return {slug: shards.record(place) for slug, place in sorted(first.items())}, subtypes, snrs
+    records = {slug: shards.record(number) for slug, number in sorted(first.items())}
+    return Census(records, subtypes, snrs)
 
 
 def _counts(shards: ShardSet) -> str:
     """Counts by group and fold, by subtype, and by SNR; sizes of the shards."""
-    places: Counter = Counter()
+    folds: Counter = Counter()
     for entry in shards.shards:
-        places[entry["group"], entry["fold"]] += entry["samples"]
-    parts = [
-        _table(
-            ("subtypes", "fold", "samples"),
-            [(*place, number) for place, number in sorted(places.items())],
-        )
-    ]
-    records, counts, snrs = _census(shards)
-    rows = [
-        (record["category"], record["subtype"], record["group"], counts[slug])
-        for slug, record in records.items()
-    ]
-    parts.append(_table(("category", "subtype", "group", "samples"), sorted(rows)))
-    parts.append(
-        _table(
-            ("SNR (dB)", "samples"), [(f"{snr:g}", number) for snr, number in sorted(snrs.items())]
-        )
-    )
+        folds[entry["group"], entry["fold"]] += entry["samples"]
+    of_folds = [(group, fold, count) for (group, fold), count in sorted(folds.items())]
+    census = _census(shards)
+    of_subtypes = []
+    for slug, record in census.records.items():
+        names = (record["category"], record["subtype"], record["group"])
+        of_subtypes.append((*names, census.subtypes[slug]))
+    of_snrs = [(f"{snr:g}", count) for snr, count in sorted(census.snrs.items())]
     sizes = [entry["bytes"] / 1e6 for entry in shards.shards]
-    parts.append(
-        f"{len(sizes)} shards of {min(sizes):.1f} to {max(sizes):.1f} MB, {sum(sizes) / 1e3:.3f} GB in all, "
+    in_all = (
+        f"{len(sizes)} shards of {min(sizes):.1f} to {max(sizes):.1f} MB, "
+        f"{sum(sizes) / 1e3:.3f} GB in all, "
         f"{1e3 * sum(sizes) / max(1, len(shards)):.1f} kB per sample.\n"
     )
-    return "\n".join(parts)
+    tables = [
+        _table(("subtypes", "fold", "samples"), of_folds),
+        _table(("category", "subtype", "group", "samples"), sorted(of_subtypes)),
+        _table(("SNR (dB)", "samples"), of_snrs),
+    ]
+    return "\n".join([*tables, in_all])
 
 
 def write_samples(shards: ShardSet, path: Path) -> None:
     """Write the table of all samples (CSV, columns FIELDS), in the order of the index."""
-    records, _, _ = _census(shards)
+    records = _census(shards).records
 
-    def rows() -> Iterator[tuple]:
+    def rows() -> Iterator[dict]:
         """One row of the table for each sample."""
         for entry, table in shards.tables():
             columns = (table[name].tolist() for name in ("key", "label", "model", "snr_db"))
-            for key, label, model, snr_db in zip(*columns, strict=True):
-                record = records[_slug(key.decode())]
-                row = (
-                    key.decode(),
-                    label,
-                    record["category"],
-                    record["subtype"],
-                    entry["group"],
-                    entry["fold"],
-                )
-                name = key.decode().rpartition("-")[0] if shards.kind == "recipe" else key.decode()
-                yield (
-                    *row,
-                    model,
-                    f"{snr_db:g}",
-                    entry["name"],
-                    f"{name}.{EXTENSIONS[shards.kind]}",
-                )
+            for stored_key, label, model, snr_db in zip(*columns, strict=True):
+                key = stored_key.decode()
+                record = records[_slug(key)]
+                # The samples of a motion model in a recipe shard share a member.
+                name = key.rpartition("-")[0] if shards.kind == "recipe" else key
+                yield {
+                    "key": key,
+                    "label": label,
+                    "category": record["category"],
+                    "subtype": record["subtype"],
+                    "group": entry["group"],
+                    "fold": entry["fold"],
+                    "model": model,
+                    "snr_db": f"{snr_db:g}",
+                    "shard": entry["name"],
+                    "file": f"{name}.{EXTENSIONS[shards.kind]}",
+                }
 
     write_csv(path, tuple(FIELDS), rows())
 
@@ -148,19 +155,21 @@ def description(shards: ShardSet) -> str:
     """Return the data set in one paragraph."""
     stations = station_names(shards.index["render"]["network"])
     contents = WHAT[shards.kind].format(stations=len(stations), columns=len(shards.spectra))
+    classes = ", ".join(map(plural, shards.classes))
     return (
-        f"Simulated echoes of low-altitude targets ({', '.join(map(plural, shards.classes))}) at the base stations "
-        f"{', '.join(stations)} of a networked sensing system, {len(shards)} samples as {contents}, "
-        "with motion parameters and geometry of every sample. Made by lowalt after 'Networked ISAC "
-        "Enabled Target "
-        "Recognition Towards Low-Altitude Economy' (Luo et al.); the samples are not that paper's "
-        "own."
+        f"Simulated echoes of low-altitude targets ({classes}) at the base stations "
+        f"{', '.join(stations)} of a networked sensing system, {len(shards)} samples as "
+        f"{contents}, with motion parameters and geometry of every sample. Made by lowalt after "
+        "'Networked ISAC Enabled Target Recognition Towards Low-Altitude Economy' (Luo et al.); "
+        "the samples are not that paper's own."
     )
 
 
 def rules(shards: ShardSet) -> str:
     """Return the version of the rules that decide the samples' bytes, as their records state it."""
-    return shards.record(0)["versions"]["lowalt"] if len(shards) else DATA_VERSION
+    if not len(shards):
+        return DATA_VERSION
+    return shards.record(0)["versions"]["lowalt"]
 
 
 def identity(run_name: str, shards: ShardSet) -> tuple[str, str]:
@@ -168,14 +177,17 @@ def identity(run_name: str, shards: ShardSet) -> tuple[str, str]:
 
     The data set of a benchmark has the benchmark's version; any other has the version of its rules.
     """
-    frozen = FROZEN.fullmatch(run_name)
     name = run_name if run_name.startswith("lowalt-") else f"lowalt-{run_name}"
-    return name, f"{frozen[1]}.0.0" if frozen else rules(shards)
+    frozen = FROZEN.fullmatch(run_name)
+    if frozen:
+        return name, f"{frozen[1]}.0.0"
+    return name, rules(shards)
 
 
 def readme(shards: ShardSet, config: str, name: str, license_name: str) -> str:
-    """Return the data card as Markdown with the metadata block that dataset hubs read; `config`:
-    the run's YAML.
+    """Return the data card as Markdown with the metadata block that dataset hubs read.
+
+    config: the run's YAML.
     """
     # Template blocks must not leave empty lines.
     templates = jinja2.Environment(
@@ -206,8 +218,7 @@ def readme(shards: ShardSet, config: str, name: str, license_name: str) -> str:
 def write(
     index_path: str | Path, config_path: str | Path, license_name: str = "MIT", **facts: str
 ) -> None:
-    """Write README.md, samples.csv and croissant.json next to an index, and the checksums of all of
-    it.
+    """Write README.md, samples.csv, croissant.json and their checksums next to an index.
 
     facts: further properties of the Croissant description, such as `url`; `datePublished` is the
     day (UTC) on which the index was written where they name none.
@@ -223,18 +234,18 @@ def write(
     samples = folder / "samples.csv"
     write_samples(shards, samples)
     table = {"path": samples.name, "bytes": samples.stat().st_size, "sha256": sha256(samples)}
+    written = datetime.fromtimestamp(Path(index_path).stat().st_mtime, UTC)
     known = {
         "name": name,
         "description": description(shards),
         "version": version,
         "license": LICENSES[license_name],
         "citeAs": PAPER,
-        "datePublished": f"{datetime.fromtimestamp(Path(index_path).stat().st_mtime, UTC):%Y-%m-%d}",
+        "datePublished": f"{written:%Y-%m-%d}",
         **facts,
     }
-    write_file(
-        folder / "croissant.json", json.dumps(metadata(shards.index, table, known), indent=1) + "\n"
-    )
+    croissant = json.dumps(metadata(shards.index, table, known), indent=1)
+    write_file(folder / "croissant.json", croissant + "\n")
     checksums.write(index_path, shards.index)
 
 
@@ -254,13 +265,12 @@ def main(arguments: list[str]) -> None:
     line.add_argument("--url", help="where the data set will be published")
     line.add_argument("--date", help="day of publication, YYYY-MM-DD (default: the index's own)")
     options = line.parse_args(arguments)
-    facts = {"url": options.url, "datePublished": options.date}
-    write(
-        options.index,
-        options.config,
-        options.license,
-        **{key: text for key, text in facts.items() if text},
-    )
+    facts = {}
+    if options.url:
+        facts["url"] = options.url
+    if options.date:
+        facts["datePublished"] = options.date
+    write(options.index, options.config, options.license, **facts)
 
 
 if __name__ == "__main__":

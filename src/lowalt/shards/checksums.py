@@ -1,5 +1,4 @@
-"""SHA256SUMS in the folder of the index: one line for every other file of a data set, in the form
-of `sha256sum`.
+"""SHA256SUMS in the folder of the index: a line of `sha256sum` for every other file of a data set.
 
 Checksums form a chain: those of samples are in their shard's table, those of tables and shards in
 the index, those of the index and the data card here. SHA256SUMS itself needs none: any changed byte
@@ -20,10 +19,11 @@ LINE = re.compile(r"([0-9a-f]{64})  ([^\n]+)\n")
 
 def _of_index(index: dict) -> dict[str, str]:
     """Checksums that the index already states: path relative to the index's folder -> SHA-256."""
-    tables = {
-        table_path(entry["path"]).as_posix(): entry["table_sha256"] for entry in index["shards"]
-    }
-    return {entry["path"]: entry["sha256"] for entry in index["shards"]} | tables
+    sums = {}
+    for entry in index["shards"]:
+        sums[entry["path"]] = entry["sha256"]
+        sums[table_path(entry["path"]).as_posix()] = entry["table_sha256"]
+    return sums
 
 
 def _text(sums: dict[str, str]) -> str:
@@ -42,8 +42,7 @@ def write(index_path: str | Path, index: dict) -> None:
 
 
 def faults(index_path: str | Path, index: dict) -> Iterator[str]:
-    """Yield one line per fault in the index, the data card and SHA256SUMS, and per file that does
-    not belong there.
+    """Yield one line per fault in the index, the data card and SHA256SUMS, and per foreign file.
 
     The bytes of shards and tables are not read here; `verify.shard_faults` checks them against the
     index.
@@ -71,10 +70,8 @@ def faults(index_path: str | Path, index: dict) -> Iterator[str]:
             yield f"{name}: missing"
         elif sha256(folder / name) != listed[name]:
             yield f"{name}: damaged (SHA-256 differs from its line in {NAME})"
-    present = {
-        file.relative_to(folder).as_posix() for file in folder.rglob("*") if not file.is_dir()
-    }
-    yield from (
-        f"{name}: no part of the data set"
-        for name in sorted(present - {*stated, *card, *listed, NAME})
-    )
+    known = {*stated, *card, *listed, NAME}
+    files = [file for file in folder.rglob("*") if not file.is_dir()]
+    present = {file.relative_to(folder).as_posix() for file in files}
+    for name in sorted(present - known):
+        yield f"{name}: no part of the data set"

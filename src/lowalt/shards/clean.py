@@ -1,5 +1,4 @@
-"""Shards of kind `recipe`: the clean echoes of each motion model, and one record of all its SNRs.
-Readers add noise.
+"""Shards of kind `recipe`: clean echoes of each motion model, to which readers add noise.
 
 A sample of such a shard has two members: {subtype}-{model}.clean.npy holds the echoes without
 noise, and the record of the same key has lists at `snr_db` and `noise`. In a scene with effects the
@@ -38,12 +37,14 @@ def refuse(effects: dict) -> None:
 
     effects: the configuration's block. Raises: InputError naming the effect.
     """
-    if noisy := in_all_cells(effects):
+    noisy = in_all_cells(effects)
+    if noisy:
         raise InputError(
-            f"shards.kind: 'recipe' with the effect {noisy[0]!r}, whose echoes hold noise; expected "
-            "signal or image"
+            f"shards.kind: 'recipe' with the effect {noisy[0]!r}, whose echoes hold noise; "
+            "expected signal or image"
         )
-    if own := [name for name in own_effects(effects) if hasattr(module_of(name), "filtered")]:
+    own = [name for name in own_effects(effects) if hasattr(module_of(name), "filtered")]
+    if own:
         raise InputError(
             f"shards.kind: 'recipe' with the effect {own[0]!r}, whose code a reader of the shards "
             "would need for the noise; expected signal or image"
@@ -82,10 +83,10 @@ def sample_snrs(entry: dict) -> list[float]:
         raise InputError(
             f"record of {entry.get('key')}: one SNR, expected a list of them as recipe shards have"
         )
-    return [
-        snr if noisy else math.inf
-        for snr, noisy in zip(entry["snr_db"], entry["noise"], strict=True)
-    ]
+    levels = []
+    for snr_db, is_noisy in zip(entry["snr_db"], entry["noise"], strict=True):
+        levels.append(snr_db if is_noisy else math.inf)
+    return levels
 
 
 def unpacked(entry: dict, snr_db: float) -> bytes:
@@ -95,7 +96,8 @@ def unpacked(entry: dict, snr_db: float) -> bytes:
     """
     if snr_db not in sample_snrs(entry):
         raise InputError(
-            f"record of {entry['key']}: SNRs {sample_snrs(entry)} dB, expected {snr_db} dB among them"
+            f"record of {entry['key']}: SNRs {sample_snrs(entry)} dB, expected {snr_db} dB among "
+            "them"
         )
     kept = {name: value for name, value in entry.items() if name not in (POWER, *FILTERS)}
     kept |= {
@@ -107,21 +109,26 @@ def unpacked(entry: dict, snr_db: float) -> bytes:
 
 
 def noisy(entry: dict, clean: np.ndarray, stations: list[str], snr_db: float) -> np.ndarray:
-    """Return the signals of one sample from a motion model's clean echoes, both (stations, symbols)
-    complex64.
+    """Return the signals of one sample from a motion model's clean echoes.
+
+    Both are (stations, symbols) complex64.
     """
-    powers = np.array(entry[POWER])[:, None] if POWER in entry else None
+    powers = None
+    if POWER in entry:
+        powers = np.array(entry[POWER])[:, None]
     filtered = None
-    if passed := {name: json.loads(entry[name]) for name in FILTERS if name in entry}:
+    passed = {name: json.loads(entry[name]) for name in FILTERS if name in entry}
+    if passed:
         filtered = functools.partial(behind, filters=passed)
-    return noisy_signals(
-        clean[:, None], [entry], stations, [snr_db], entry["seed"], powers, filtered
-    )[0, 0]
+    echoes = clean[:, None]
+    signals = noisy_signals(echoes, [entry], stations, [snr_db], entry["seed"], powers, filtered)
+    return signals[0, 0]
 
 
 def complex_signals(stored: np.ndarray) -> np.ndarray:
-    """Return the signals of a stored array: (stations, symbols, 2) float32, or complex64 as version
-    0.1 wrote them.
+    """Return the signals of a stored array (stations, symbols, 2) float32.
+
+    Version 0.1 stored complex64, which is returned as it is.
     """
     if stored.dtype == np.complex64:
         return stored
@@ -129,8 +136,7 @@ def complex_signals(stored: np.ndarray) -> np.ndarray:
 
 
 def samples(models: Iterable[dict]) -> Iterator[dict]:
-    """Yield all samples, in the form of signal shards, from motion models that another tool reads
-    from recipe shards.
+    """Yield all samples as signal shards hold them, of motion models read from recipe shards.
 
     models: dicts with `json` and `clean.npy`, as bytes or decoded, as in a pipeline of webdataset.
     Yields dicts with `__key__`, `json` (parsed) and `npy`, (stations, symbols, 2) float32. For
@@ -138,17 +144,15 @@ def samples(models: Iterable[dict]) -> Iterator[dict]:
     """
     for model in models:
         entry = model["json"]
+        if isinstance(entry, (bytes, str)):
+            entry = json.loads(entry)
         stored = model["clean.npy"]
-        entry = json.loads(entry) if isinstance(entry, (bytes, str)) else entry
-        stored = (
-            np.lib.format.read_array(io.BytesIO(stored))
-            if isinstance(stored, bytes)
-            else np.asarray(stored)
-        )
-        clean = complex_signals(stored)
+        if isinstance(stored, bytes):
+            stored = np.lib.format.read_array(io.BytesIO(stored))
+        clean = complex_signals(np.asarray(stored))
         stations = list(entry["geometry"])
         for snr_db in sample_snrs(entry):
             record = json.loads(unpacked(entry, snr_db))
             signal = noisy(entry, clean, stations, snr_db)
-            parts = np.ascontiguousarray(signal).view(np.float32).reshape(*signal.shape, 2)
-            yield {**model, "__key__": record["key"], "json": record, "npy": parts}
+            pairs = np.ascontiguousarray(signal).view(np.float32).reshape(*signal.shape, 2)
+            yield {**model, "__key__": record["key"], "json": record, "npy": pairs}

@@ -1,6 +1,4 @@
-"""Turns the files of a chunk into a function from (motion model, SNR) to the bytes of a shard
-member.
-"""
+"""Turns the files of a chunk into a function from (motion model, SNR) to the bytes of a member."""
 
 from collections.abc import Sequence
 
@@ -47,7 +45,8 @@ def noisy_content(
         return lambda number, level: (npy(signals[number, level]), {})
     if tiles is None:
         raise InputError("--tiles: missing, image shards are packed from them")
-    images, (models, levels) = Tiles(tiles), shape
+    images = Tiles(tiles)
+    models, levels = shape
     if len(images) != models * levels:
         raise InputError(f"{tiles}: {len(images)} images, expected {models * levels}")
     return lambda number, level: (images[number * levels + level], {})
@@ -56,10 +55,10 @@ def noisy_content(
 def clean_content(
     paths: list[str] | None, powers: list[str] | None, network: Network, models: int
 ) -> tuple[Content, np.ndarray | None]:
-    """Return the content of recipe shards from the chunk's clean echoes, and the powers (stations,
-    models) W or None.
+    """Return the content of recipe shards from the chunk's clean echoes, and powers or None.
 
-    Raises: InputError naming the option or file that is missing or does not fit.
+    The powers (stations, models) W are what SNRs refer to. Raises: InputError naming the option or
+    file that is missing or does not fit.
     """
     if not paths:
         raise InputError("--echoes: missing, recipe shards are packed from them")
@@ -68,15 +67,16 @@ def clean_content(
     wanted = (models, network.symbols)
     first = echoes[0]
     if len(echoes) != len(stations) or first.shape != wanted or first.dtype != np.complex64:
-        raise InputError(
-            f"{existing(paths[0], 'echo')}: {first.dtype} {first.shape}, expected complex64 {wanted}"
-        )
+        path = existing(paths[0], "echo")
+        raise InputError(f"{path}: {first.dtype} {first.shape}, expected complex64 {wanted}")
 
     def content(number: int, level: int) -> tuple[bytes, dict]:
         """The clean echoes of one motion model."""
         return npy(np.stack([echo[number] for echo in echoes])), {}
 
-    return content, load_powers(powers, stations, models) if powers else None
+    if not powers:
+        return content, None
+    return content, load_powers(powers, stations, models)
 
 
 def cube_content(
@@ -92,13 +92,9 @@ def cube_content(
 
     def content(model: int, level: int) -> tuple[bytes, dict]:
         """The cubes of one sample and what its record says of them."""
-        heard = zip(network.stations, signals[model, level], strict=True)
-        row = rows[model]
-        snr_db = snrs[level]
-        return of_cubes(
-            [cubes.of(row, snr_db, station, signal) for station, signal in heard],
-            network,
-            cell_type,
-        )
+        made = []
+        for station, signal in zip(network.stations, signals[model, level], strict=True):
+            made.append(cubes.of(rows[model], snrs[level], station, signal))
+        return of_cubes(made, network, cell_type)
 
     return content

@@ -1,5 +1,4 @@
-"""Croissant metadata of a data set: its shards with checksums, and the table of its samples as
-records.
+"""Croissant metadata of a data set: its shards with checksums, the table of its samples.
 
 There is no record set with images, because tools would unpack every shard before returning the
 first record.
@@ -11,10 +10,10 @@ from lowalt.shards.sample_table import EXTENSIONS
 from lowalt.spectra.catalogue import named
 
 TERMS = """
-    arrayShape citeAs column containedIn dataBiases dataCollection equivalentProperty extract field fileObject
-    fileProperty fileSet format includes isArray isLiveDataset jsonPath key md5 parentField path
-    personalSensitiveInformation recordSet references regex repeated replace samplingRate separator source subField
-    transform
+    arrayShape citeAs column containedIn dataBiases dataCollection equivalentProperty extract
+    field fileObject fileProperty fileSet format includes isArray isLiveDataset jsonPath key md5
+    parentField path personalSensitiveInformation recordSet references regex repeated replace
+    samplingRate separator source subField transform
 """
 """Terms of the format whose prefixed name is cr:TERM."""
 CONTEXT = {
@@ -46,9 +45,7 @@ FIELDS = {
     "shard": ("sc:Text", "Shard that holds the sample's members KEY.json and its image or signal."),
     "file": ("sc:Text", "Name of the sample's image or signal in the shard."),
 }
-"""Columns of the table of all samples: data type and meaning; the label's meaning names the
-classes.
-"""
+"""Columns of the table of all samples: data type and meaning; the label's names the classes."""
 
 ARRAY = "application/octet-stream"
 MEDIA = {
@@ -60,27 +57,25 @@ MEDIA = {
     "cube": (
         ARRAY,
         "Range cells with noise of every sample (stations, symbols, cells, re and im), float32 or "
-        "int16 "
-        "times the record's step, as an .npy file.",
+        "int16 times the record's step, as an .npy file.",
     ),
     "recipe": (
         ARRAY,
         "Echoes without noise of every motion model (stations, symbols, re and im), float32, as an "
-        ".npy "
-        "file.",
+        ".npy file.",
     ),
 }
 """Media type and meaning of the member next to the record, by kind of shards."""
 OF = {"image": "sample", "signal": "sample", "cube": "sample", "recipe": "motion model"}
-"""What one member of a shard describes; in recipe shards all SNRs of a motion model share one
-member.
-"""
+"""What one member of a shard describes; all SNRs of a motion model share a recipe's member."""
 RESPONSIBLE = {
-    "dataCollection": "All samples are simulated from the configuration in README.md. No radar recorded them.",
+    "dataCollection": "All samples are simulated from the configuration in README.md. No radar "
+    "recorded them.",
     "dataCollectionType": ["Software Collection"],
-    "dataCollectionRawData": "None. Samples follow from the configuration and the published sizes and rates.",
-    "dataCollectionMissingData": "None: every motion model has a sample at every SNR. A number that does not apply "
-    "to a target is 0 in its record, and one that is unknown is null.",
+    "dataCollectionRawData": "None. Samples follow from the configuration and the published sizes "
+    "and rates.",
+    "dataCollectionMissingData": "None: every motion model has a sample at every SNR. A number "
+    "that does not apply to a target is 0 in its record, and one that is unknown is null.",
     "dataImputationProtocol": "No value is imputed.",
     "dataPreprocessingProtocol": [
         "README.md names the spectra, the noise and the scaling of the images."
@@ -109,14 +104,14 @@ RESPONSIBLE = {
         "Built-in targets are parametric models with published sizes and rates, not measured "
         "objects.",
     ],
-    "dataSocialImpact": "Recognition of drones serves the safety of the low airspace. The same methods can monitor the "
-    "movements of people.",
+    "dataSocialImpact": "Recognition of drones serves the safety of the low airspace. The same "
+    "methods can monitor the movements of people.",
     "personalSensitiveInformation": [
         "None is simulated. Recordings of gaits that a user adds keep their own terms."
     ],
-    "dataReleaseMaintenancePlan": "README.md has the configuration and the version of the rules that make the same "
-    "bytes again. The data set of a benchmark (lowalt-40-v1) never changes: a correction "
-    "gets a new version.",
+    "dataReleaseMaintenancePlan": "README.md has the configuration and the version of the rules "
+    "that make the same bytes again. The data set of a benchmark (lowalt-40-v1) never changes: a "
+    "correction gets a new version.",
 }
 """Properties of the responsible-AI vocabulary. Source: Croissant RAI specification 1.0 (MLCommons).
 """
@@ -132,21 +127,12 @@ def metadata(index: dict, table: dict, facts: dict) -> dict:
     classes = ", ".join(f"{number} {name}" for number, name in enumerate(stated(index)))
     kind = index["kind"]
     inside = [{"@id": entry["name"]} for entry in index["shards"]]
-    files = [
-        _file(
-            entry,
-            "application/x-tar",
-            f"{entry['samples']} samples, {entry['group']} subtypes, {entry['fold']} fold.",
-        )
-        for entry in index["shards"]
-    ]
-    files.append(
-        _file(
-            {**table, "name": table["path"]},
-            "text/csv",
-            "One row per sample: key, class, SNR, shard.",
-        )
-    )
+    files = []
+    for entry in index["shards"]:
+        about = f"{entry['samples']} samples, {entry['group']} subtypes, {entry['fold']} fold."
+        files.append(_file(entry, "application/x-tar", about))
+    about = "One row per sample: key, class, SNR, shard."
+    files.append(_file({**table, "name": table["path"]}, "text/csv", about))
     mime, meaning = MEDIA[kind]
     size = index["render"]["images"]["size"]
     stations = len(index["render"]["network"]["stations"])
@@ -202,8 +188,9 @@ def _files(name: str, inside: list[dict], mime: str, pattern: str, meaning: str)
 
 
 def _samples(table: str, classes: str) -> dict:
-    """The record set with one row for each sample, from the table; classes: with their numbers, as
-    one text.
+    """The record set with one row for each sample, from the table.
+
+    classes: with their numbers, as one text.
     """
     fields = [
         {
@@ -222,6 +209,7 @@ def _samples(table: str, classes: str) -> dict:
         "name": "samples",
         "key": {"@id": "samples/key"},
         "field": fields,
-        "description": "All samples with their labels, and the shard and the file that hold each. Records with images "
-        "or signals: datasets.load_dataset, which streams the shards (README.md).",
+        "description": "All samples with their labels, and the shard and the file that hold each. "
+        "Records with images or signals: datasets.load_dataset, which streams the shards "
+        "(README.md).",
     }

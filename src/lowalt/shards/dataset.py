@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from lowalt.config.blocks import motion_block
+from lowalt.config.brought import OF_TRAINING, refuse_brought
 from lowalt.config.layers import SCHEMA, check
 from lowalt.config.network import masts_m
 from lowalt.config.splits import FOLDS
@@ -23,7 +24,6 @@ from lowalt.motion.drawing import region_polygon
 from lowalt.motion.track_files import path_of
 from lowalt.motion.tracks import model_rows
 from lowalt.scene.effects import complete, needs_surfaces, of_record
-from lowalt.scene.trust import refuse_effects
 from lowalt.shards.maker import Maker
 from lowalt.shards.plan import GROUPS, Plan
 from lowalt.shards.remake import CloudFolder
@@ -36,8 +36,10 @@ from lowalt.targets.records import missing_inputs, records_of
 
 
 class Sample(NamedTuple):
-    """One sample: `image` its tile of index values, (3 S, 3 S) uint8; `signal` (stations, symbols)
-    complex64; `record` a dict, as in the shards."""
+    """One sample: `image`, its tile of index values, `signal`, and `record`, as in the shards.
+
+    image: (3 S, 3 S) uint8; signal: (stations, symbols) complex64; record: a dict.
+    """
 
     image: np.ndarray
     signal: np.ndarray
@@ -45,7 +47,7 @@ class Sample(NamedTuple):
 
 
 class MadeOnDemand(Mapping):
-    """The result of `make` for each target's record, by subtype, computed on first access and kept."""
+    """The result of `make` for each target's record, by subtype, computed on first access."""
 
     def __init__(
         self, make: Callable[..., Any], records: dict[str, dict], seed: int, inputs: Path | None
@@ -59,8 +61,9 @@ class MadeOnDemand(Mapping):
         self._made: dict[str, Any] = {}
 
     def __getitem__(self, name: str) -> Any:
-        """The result for one target. Raises: KeyError for another; InputError where its record or
-        input is wrong.
+        """The result for one target, kept once it is made.
+
+        Raises: KeyError for another name; InputError where its record or input is wrong.
         """
         if name not in self._made:
             self._made[name] = self._make(self._records[name], *self._sources)
@@ -94,8 +97,7 @@ def made_surfaces(record: dict, inputs: Path | None, seed: int) -> dict:
 
 
 class Dataset:
-    """The samples of a configuration by number: group by group, model by model, subtype by subtype,
-    SNR by SNR.
+    """The samples of a configuration by number: by group, then model, then subtype, then SNR.
 
     A crow's first second, at 3 dB:
 
@@ -121,12 +123,12 @@ class Dataset:
         published: dict[str, dict] | None = None,
         records: dict[str, dict] | None = None,
     ) -> None:
-        """Take a merged configuration, or the path of one such as results/RUN/config.yaml, and
-        choose groups and folds.
+        """Take a merged configuration or the path of one, and choose groups and folds.
 
-        clouds: the clouds by subtype, or the folder of their files; by default they are made here,
-        from the records that the configuration names and the folder `inputs` of meshes and
-        recordings, each when it is first asked for.
+        config: the configuration, or a path such as results/RUN/config.yaml. clouds: the clouds by
+        subtype, or the folder of their files; by default they are made here, from the records that
+        the configuration names and the folder `inputs` of meshes and recordings, each when it is
+        first asked for.
         occluders: each subtype's surfaces, for effects that need them; by default made here if
         the clouds are.
         published: the row of each subtype in the table of targets, which decides the classes; by
@@ -137,7 +139,9 @@ class Dataset:
         if isinstance(config, (str, Path)):
             path = config
             config = check(load_yaml(config), shipped(SCHEMA))
-            refuse_effects(config["effects"], path)
+            # The folder of inputs is an argument here, and no network is trained.
+            unused = ("inputs", *OF_TRAINING)
+            refuse_brought({key: config[key] for key in config if key not in unused}, path)
         self.config = config
         if records is None and (published is None or clouds is None):
             # A run's configuration names tables and records as seen from the checkout it was made
@@ -150,27 +154,32 @@ class Dataset:
         self.classes = self.listed.classes
         self.groups = self.listed.groups
         self.folds = self.listed.folds
+        subtypes: list[str] = []
+        for group in self.groups:
+            subtypes += self.plan.groups[group]
         if clouds is None:
-            wanted = {
-                name: records[name] for group in self.groups for name in self.plan.groups[group]
-            }
-            sources = wanted, config["seed"], Path(inputs) if inputs else None
-            if missing := missing_inputs(wanted, sources[-1]):
+            wanted = {name: records[name] for name in subtypes}
+            folder = Path(inputs) if inputs else None
+            missing = missing_inputs(wanted, folder)
+            if missing:
                 raise InputError("missing inputs:\n  " + "\n  ".join(missing))
-            clouds = MadeOnDemand(made_cloud, *sources)
+            clouds = MadeOnDemand(made_cloud, wanted, config["seed"], folder)
             if occluders is None and needs_surfaces(config["effects"]):
-                occluders = MadeOnDemand(made_surfaces, *sources)
-        self.clouds = clouds if isinstance(clouds, Mapping) else CloudFolder(clouds)
+                occluders = MadeOnDemand(made_surfaces, wanted, config["seed"], folder)
+        if not isinstance(clouds, Mapping):
+            clouds = CloudFolder(clouds)
+        self.clouds = clouds
         self._masts = np.array(masts_m(config["network"]), float)
         self._corners = region_polygon(self._masts, config["motion"]["region"]["polygon_m"])
         self._motion = motion_block(located(config))
         self._path = path_of(self._motion, self._corners, self._masts)
-        self._drawn: tuple[tuple, list[dict]] = (), []
+        self._track: tuple[str, int] | None = None
+        self._track_rows: list[dict] = []
         render = {key: config[key] for key in ("network", "spectra", "images")}
         echo = {"tolerance": config["echo"]["tolerance"], "effects": config["effects"]}
         self._recorded = complete(of_record(config["effects"]))
         self.maker = Maker(render, echo, config["seed"], self.clouds, occluders)
-        chosen = [self.published[name] for group in self.groups for name in self.plan.groups[group]]
+        chosen = [self.published[name] for name in subtypes]
         network = self.maker.network
         texts = network.folding(chosen), network.range_folding(self._corners)
         self.folding = tuple(text for text in texts if text)
@@ -196,25 +205,23 @@ class Dataset:
         return self.listed.named(subtype, model, snr_db)
 
     def row(self, place: Place) -> dict:
-        """Return the motion table's row of a sample; models beyond the configuration's count are
-        drawn too.
-        """
+        """Return the motion table's row of a sample, also of models beyond the configuration's."""
         track, look = divmod(place.model, self.plan.looks)
-        name = place.subtype, track
         # All looks of a track are drawn together and usually accessed in sequence, so keep the last
         # track.
-        if self._drawn[0] != name:
-            sources = (
+        if self._track != (place.subtype, track):
+            self._track_rows = model_rows(
+                self.plan.seed,
                 self.clouds[place.subtype],
                 self.published[place.subtype],
                 self._masts,
                 self._corners,
+                self._motion,
+                track,
+                self._path,
             )
-            self._drawn = (
-                name,
-                model_rows(self.plan.seed, *sources, self._motion, track, self._path),
-            )
-        row = {**self._drawn[1][look], "group": place.group, "model": place.model}
+            self._track = (place.subtype, track)
+        row = {**self._track_rows[look], "group": place.group, "model": place.model}
         return accompanied(row, self._recorded, self.plan.seed, self.maker.network)
 
     def made_signal(self, place: Place) -> np.ndarray:
@@ -222,15 +229,16 @@ class Dataset:
         return self.maker.signal(self.row(place), place.snr_db)
 
     def made_record(self, place: Place, cubes: dict | None = None) -> bytes:
-        """Return the JSON record of a sample; cubes: its part about each station's cube."""
-        facts = (
+        """Return the JSON record of a sample; cubes: what it says of each station's cube."""
+        return record(
+            self.row(place),
             place.snr_db,
             self.listed.fold(place),
             self.plan.seed,
             self.maker.network,
             self.classes,
+            cubes,
         )
-        return record(self.row(place), *facts, cubes)
 
     def made(self, place: Place) -> Sample:
         """Return a sample by its group, subtype, motion model and SNR.
@@ -262,8 +270,10 @@ class Dataset:
         return json.loads(self.made_record(self.place(number)))
 
     def members(self, number: int, kind: str) -> tuple[bytes, bytes]:
-        """Return record and data of a sample, byte for byte as a shard of a kind holds them
-        ("image", "cube", or "signal" and "recipe", which hold the same)."""
+        """Return record and data of a sample, byte for byte as a shard of a kind holds them.
+
+        kind: "image", "cube", or "signal" and "recipe", which hold the same.
+        """
         place = self.place(number)
         row = self.row(place)
         signal = self.made_signal(place)
@@ -271,9 +281,7 @@ class Dataset:
         return self.made_record(place, cubes), data
 
     def cubes(self, number: int) -> list[Cube]:
-        """Return the cube of each station of a sample: its noisy range cells, the chosen ones, and
-        the truth.
-        """
+        """Return the cube of each station of a sample: noisy range cells, chosen ones, truth."""
         place = self.place(number)
         return self.maker.cubes(self.row(place), place.snr_db, self.made_signal(place))
 
@@ -283,8 +291,7 @@ class Dataset:
 
 
 class Endless:
-    """An endless sequence of samples: all subtypes at all SNRs, for increasing numbers of the
-    motion model.
+    """An endless sequence of samples: all subtypes at all SNRs, model after model.
 
     With `parts` workers or ranks, number `part` takes every `parts`-th motion model, so that no
     sample is made twice.
@@ -305,7 +312,7 @@ class Endless:
         self.first = dataset.plan.models if first is None else first
 
     def places(self) -> Iterator[Place]:
-        """Yield the place of each sample in turn; no sample is made."""
+        """Yield the name of each sample in turn; no sample is made."""
         return self.dataset.listed.models_from(self.first + self.part, self.parts)
 
     def __iter__(self) -> Iterator[Sample]:

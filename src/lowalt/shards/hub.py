@@ -1,6 +1,4 @@
-"""The metadata block at the head of a data card, as dataset hubs read it: licence, protocols and
-their shards.
-"""
+"""The metadata block at the head of a data card: licence, protocols and shards, as hubs read it."""
 
 import json
 from collections.abc import Iterator
@@ -21,45 +19,46 @@ TAGS = ["radar", "integrated-sensing-and-communication", "micro-doppler", "webda
 
 
 def patterns(shards: ShardSet, group: str, fold: str) -> list[str]:
-    """Return one glob pattern that matches exactly the shards of a group and fold, or else their
-    paths.
-    """
-    names = [
-        entry["path"] for entry in shards.shards if (entry["group"], entry["fold"]) == (group, fold)
-    ]
+    """Return the glob pattern that matches just the shards of a group and fold, or their paths."""
+    names = []
+    for entry in shards.shards:
+        if entry["group"] == group and entry["fold"] == fold:
+            names.append(entry["path"])
     usual = f"{group}-{fold}-*.tar"
     # The hub's `*` does not match `/`; fnmatchcase's does.
     paths = [entry["path"] for entry in shards.shards if "/" not in entry["path"]]
     matched = [path for path in paths if fnmatchcase(path, usual)]
-    return [usual] if matched == names else names
+    if matched == names:
+        return [usual]
+    return names
 
 
 def configs(shards: ShardSet) -> list[dict]:
-    """Return the protocols as a hub's configurations: for each its splits and the shards of each
-    split.
+    """Return the protocols as a hub's configurations: the splits of each, and their shards.
 
     Patterns match shards by group and fold in their names, so the list is short even for thousands
     of shards.
     """
     present = {(entry["group"], entry["fold"]) for entry in shards.shards}
-    hub = {"train": "train", "val": "validation", "test": "test"}
+    split_of_fold = {"train": "train", "val": "validation", "test": "test"}
     result: list[dict] = []
     for protocol in ("seen", "unseen"):
         files: dict[str, list[str]] = {}
         for group, fold in sorted(present, key=lambda pair: (pair[0], FOLDS.index(pair[1]))):
             # In the unseen protocol all folds of the unseen group are test data, and the seen group
             # has none.
-            both = protocol == "seen" or group == "seen"
+            split = split_of_fold[fold]
             if protocol == "unseen" and group == "seen" and fold == "test":
                 continue
-            files.setdefault(hub[fold] if both else "test", []).extend(
-                patterns(shards, group, fold)
-            )
+            if protocol == "unseen" and group == "unseen":
+                split = "test"
+            files.setdefault(split, []).extend(patterns(shards, group, fold))
         if protocol == "unseen" and not any(group == "unseen" for group, _ in present):
             continue
-        splits = [
-            {"split": split, "path": files[split]} for split in hub.values() if split in files
-        ]
+        splits = []
+        for split in split_of_fold.values():
+            if split in files:
+                splits.append({"split": split, "path": files[split]})
         result.append({"config_name": protocol, "data_files": splits})
     if result:
         result[0]["default"] = True
@@ -67,16 +66,16 @@ def configs(shards: ShardSet) -> list[dict]:
 
 
 def records(shards: ShardSet) -> Iterator[dict]:
-    """Yield every stored record once, shard by shard; the samples of a motion model in a recipe
-    shard share one.
+    """Yield every stored record once, shard by shard, reading nothing but the records.
 
-    Only the records are read. Raises: InputError naming the shard where one is damaged.
+    In a recipe shard, the samples of a motion model share a record. Raises: InputError naming the
+    shard where one is damaged.
     """
     for entry, table in shards.tables():
         path = existing(Path(shards.index_path).parent / entry["path"], "shard")
-        offsets, places = np.unique(table["record_offset"], return_index=True)
+        offsets, rows = np.unique(table["record_offset"], return_index=True)
         with path.open("rb") as file:
-            for offset, size in zip(offsets, table["record_size"][places], strict=True):
+            for offset, size in zip(offsets, table["record_size"][rows], strict=True):
                 file.seek(int(offset))
                 with reading(path, "shard"):
                     record = json.loads(file.read(int(size)))
@@ -84,10 +83,10 @@ def records(shards: ShardSet) -> Iterator[dict]:
 
 
 def features(shards: ShardSet) -> list[dict]:
-    """Return the columns of the data set as the hub's library `datasets` types them, the label's
-    with its classes.
+    """Return the columns of the data set as the hub's library `datasets` types them.
 
-    Raises: InputError where a field has unlike types in the records.
+    The label's column has its classes. Raises: InputError where a field has unlike types in the
+    records.
     """
     kinds: Type = None
     first = None
@@ -101,13 +100,15 @@ def features(shards: ShardSet) -> list[dict]:
     for field in record["struct"]:
         if field["name"] == "label":
             field["dtype"] = {"class_label": {"names": classes}}
-    data: dict = {"dtype": "image"}
-    if shards.kind != "image":
-        # One nested list per axis of the array.
-        axes = {
-            "list": {"list": {"list": "int16" if cell_type_of(first) == "int16" else "float32"}}
-        }
-        data = {"list": axes} if shards.kind == "cube" else axes
+    # The type of an array is one nested list per axis.
+    if shards.kind == "image":
+        data: dict = {"dtype": "image"}
+    elif shards.kind != "cube":
+        data = {"list": {"list": {"list": "float32"}}}
+    elif cell_type_of(first) == "int16":
+        data = {"list": {"list": {"list": {"list": "int16"}}}}
+    else:
+        data = {"list": {"list": {"list": {"list": "float32"}}}}
     return [
         column("__key__", "string"),
         column("__url__", "string"),

@@ -1,5 +1,4 @@
-"""The index of a data set: every shard with its group, fold, counts and checksums, and how signals
-are rendered.
+"""The index of a data set: all shards with group, fold, counts, checksums, and how to render.
 
 It is made from the headers of the shards' tables, without reading the shards. Offsets and SHA-256
 of samples are in the shards' tables, and the tables' SHA-256 in the index, so one checksum of the
@@ -50,9 +49,8 @@ def build(
             raise InputError(
                 f"{shard}: {shard.stat().st_size} bytes, its table says {header['bytes']}"
             )
-        entries.append(
-            {**header, "path": _relative(shard, Path(out)), "table_sha256": sha256(table)}
-        )
+        path = _relative(shard, Path(out))
+        entries.append({**header, "path": path, "table_sha256": sha256(table)})
     names = [entry["name"] for entry in entries]
     kinds = sorted({entry["kind"] for entry in entries})
     if len(set(names)) < len(names) or len(kinds) != 1:
@@ -122,7 +120,7 @@ def checked(index: dict, path: str | Path) -> dict:
         raise InputError(f"{path}: the index is damaged (SHA-256 differs)")
     check_brought("index", index, path)
     for entry in index["shards"]:
-        place = PurePosixPath(entry["path"])
-        if place.is_absolute() or ".." in place.parts:
+        shard = PurePosixPath(entry["path"])
+        if shard.is_absolute() or ".." in shard.parts:
             raise InputError(f"{path}: shard {entry['path']!r} lies outside the index's folder")
     return index

@@ -9,6 +9,7 @@ import copy
 import hashlib
 import json
 import os
+import stat
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -32,8 +33,10 @@ Layer = str | Path | dict
 
 
 class Kept(NamedTuple):
-    """A checked configuration: the merged records of all its targets, the folder of inputs, the
-    state of every file that it names, and the data sets made from it, by subtype.
+    """A checked configuration and what was made of it.
+
+    records: of all its targets, merged; inputs: the folder of inputs; states: of every file that
+    it names; datasets: by subtype.
     """
 
     config: dict
@@ -47,14 +50,14 @@ _kept: dict[str, Kept] = {}
 
 
 def alone(configuration: Layer | Iterable[Layer], subtype: str) -> Dataset:
-    """Return the data set of one subtype and of those that the scene's effects need, without any
-    other target.
+    """Return the data set of one subtype and of those that the scene's effects need.
 
     Raises: InputError naming the key, value or file that is wrong.
     """
-    given = [configuration] if isinstance(configuration, (dict, str, Path)) else configuration
+    if isinstance(configuration, (dict, str, Path)):
+        configuration = [configuration]
     # The caller may change a layer after the call.
-    layers = copy.deepcopy(list(given))
+    layers = copy.deepcopy(list(configuration))
     key = _content(layers)
     found = _kept.pop(key, None)
     if found is None or any(_state(path) != state for path, state in found.states.items()):
@@ -81,7 +84,10 @@ def _content(layers: Sequence[Layer]) -> str:
     """The layers as one text, with the content of files in place of them."""
     held: list[object] = [str(Path.cwd()), os.environ.get("LOWALT_INPUTS")]
     for layer in layers:
-        held.append(layer if isinstance(layer, dict) else [str(layer), _state(shipped(layer))])
+        if isinstance(layer, dict):
+            held.append(layer)
+        else:
+            held.append([str(layer), _state(shipped(layer))])
     # The order of keys counts: it is that of the stations. `repr` stands for what JSON lacks.
     return json.dumps(held, default=repr)
 
@@ -90,6 +96,8 @@ def _state(path: Path) -> object:
     """What tells a file's content from another: its SHA-256, or size and time; None without it."""
     try:
         about = path.stat()
+        if not stat.S_ISREG(about.st_mode):
+            return None  # a pipe or a device may never end
         if about.st_size > MOST_COMPARED_BYTES:
             return [about.st_size, about.st_mtime_ns]
         return hashlib.sha256(path.read_bytes()).hexdigest()
@@ -98,17 +106,22 @@ def _state(path: Path) -> object:
 
 
 def _checked(layers: Sequence[Layer]) -> Kept:
-    """The configuration of layers on the embedded default, or the whole one that they are."""
-    schema = shipped(SCHEMA)
-    first = layers[0] if len(layers) == 1 else None
-    if isinstance(first, dict) and set(load_yaml(schema)["required"]) <= set(first):
-        config = check(copy.deepcopy(first), schema)
-    else:
-        config = overlaid(layers)
+    """A whole configuration checked, or layers on the embedded default, with what they name."""
+    config = _configuration(layers)
     inputs = config["inputs"] or os.environ.get("LOWALT_INPUTS")
     targets = located(config)["targets"]
     states = {path: _state(path) for path in _named_files(located(config), inputs)}
     return Kept(config, records_of(targets, inputs), inputs, states, {})
+
+
+def _configuration(layers: Sequence[Layer]) -> dict:
+    """The configuration of layers on the embedded default, or the whole one that they are."""
+    schema = shipped(SCHEMA)
+    if len(layers) == 1 and isinstance(layers[0], dict):
+        is_whole = set(load_yaml(schema)["required"]) <= set(layers[0])
+        if is_whole:
+            return check(copy.deepcopy(layers[0]), schema)
+    return overlaid(layers)
 
 
 def _made(kept: Kept, subtype: str) -> Dataset:
@@ -119,8 +132,10 @@ def _made(kept: Kept, subtype: str) -> Dataset:
 
 
 def _named_files(config: dict, inputs: str | None) -> Iterator[Path]:
-    """Yield the files that a configuration or a record of its targets names; a file of the folder
-    of inputs also if it is not there, since a record may then be replaced by an earlier one.
+    """Yield the files that a configuration or a record of its targets names.
+
+    A file of the folder of inputs counts also if it is not there, since a record may then be
+    replaced by an earlier one.
     """
     for text in _texts(config):
         path = Path(text)

@@ -26,9 +26,7 @@ from lowalt.tiles.png import encode
 from lowalt.tiles.render import Renderer
 
 KEPT = 16
-"""Default number of motion models whose clean echoes are cached (10 kB each), for use at all their
-SNRs.
-"""
+"""Default number of motion models whose clean echoes (10 kB each) are cached for all their SNRs."""
 
 
 class Maker:
@@ -42,10 +40,10 @@ class Maker:
         clouds: Mapping[str, Cloud],
         occluders: Mapping[str, dict] | None = None,
     ) -> None:
-        """Take the settings {network, spectra, images} and {tolerance, effects}, the random seed
-        and clouds by subtype.
+        """Take settings, the random seed and clouds by subtype.
 
-        occluders: each subtype's surfaces, where the scene hides points behind them.
+        render: the settings {network, spectra, images}; echo: {tolerance, effects}; occluders: each
+        subtype's surfaces, where the scene hides points behind them.
         Raises: InputError naming the key and value that is missing, unknown or out of range.
         """
         self.render = render
@@ -61,12 +59,10 @@ class Maker:
     def __getstate__(self) -> dict:
         """State for pickle, without tables and kept echoes."""
         # Each worker computes its own tables.
-        kept = {
-            name: value
-            for name, value in self.__dict__.items()
-            if name not in ("renderer", "_cubes")
-        }
-        return {**kept, "_received": {}}
+        kept = {**self.__dict__, "_received": {}}
+        kept.pop("renderer", None)
+        kept.pop("_cubes", None)
+        return kept
 
     @functools.cached_property
     def renderer(self) -> Renderer:
@@ -82,39 +78,43 @@ class Maker:
     def cubes(
         self, row: dict, snr_db: float, signal: np.ndarray, stations: Sequence[int] | None = None
     ) -> list[Cube]:
-        """Return the cube of each station of a sample of the motion model `row` at an SNR (dB);
-        signal: its noisy signals (stations, symbols); stations: numbers of those to make, all by
-        default.
+        """Return the cube of each station of a sample of the motion model `row` at an SNR (dB).
 
-        Raises: InputError naming the sample that cannot be computed.
+        signal: its noisy signals (stations, symbols); stations: numbers of those to make, all by
+        default. Raises: InputError naming the sample that cannot be computed.
         """
-        chosen = range(len(self.network.stations)) if stations is None else stations
-        return [
-            self._cubes.of(row, snr_db, self.network.stations[number], signal[number])
-            for number in chosen
-        ]
+        made = []
+        for number in self._numbers(stations):
+            made.append(self._cubes.of(row, snr_db, self.network.stations[number], signal[number]))
+        return made
+
+    def _numbers(self, stations: Sequence[int] | None) -> Sequence[int]:
+        """The numbers of some stations, those of all stations for None."""
+        if stations is None:
+            return range(len(self.network.stations))
+        return stations
 
     def seen(self, row: dict, snr_db: float, station: Station) -> SceneSample:
         """Return the motion model `row` as a station of the scene sees it, at an SNR (dB)."""
         return self._cubes.sample(row, snr_db, station)
 
     def shown(self, row: dict, snr_db: float, signal: np.ndarray) -> list[Cube] | None:
-        """Return the cubes that images are made of, as `cubes`; None where no spectrum is made of
-        range cells.
-        """
-        return self.cubes(row, snr_db, signal) if of_cells(self.render["spectra"]) else None
+        """Return the cubes of `cubes` where a spectrum is made of range cells, otherwise None."""
+        if not of_cells(self.render["spectra"]):
+            return None
+        return self.cubes(row, snr_db, signal)
 
     def received(
         self, row: dict, snr_db: float | None = None, stations: Sequence[int] | None = None
     ) -> tuple[np.ndarray, np.ndarray | None]:
-        """Return a motion model's clean echoes (stations, symbols) complex64 and the reference
-        powers (stations, 1) W of SNRs, None if these are the powers of the echoes. With an SNR
-        (dB), the echoes include the noise of all range cells. stations: numbers of those to
-        compute, all by default.
+        """Return a motion model's clean echoes (stations, symbols) complex64 and powers for SNRs.
 
+        The powers (stations, 1) W are what SNRs refer to, None if they are the powers of the
+        echoes. With an SNR (dB), the echoes include the noise of all range cells. stations:
+        numbers of those to compute, all by default.
         Raises: InputError naming the sample that cannot be computed.
         """
-        chosen = tuple(range(len(self.network.stations)) if stations is None else stations)
+        chosen = tuple(self._numbers(stations))
         key = row["subtype"], row["model"], snr_db, chosen
         if key not in self._received:
             if len(self._received) >= self.kept:
@@ -129,7 +129,7 @@ class Maker:
     def _listen(
         self, row: dict, snr_db: float | None, names: list[str]
     ) -> tuple[np.ndarray, np.ndarray | None]:
-        """Compute `received` for a motion model whose echoes are not kept, at the stations `names`."""
+        """Compute `received` for a motion model whose echoes are not kept, at some stations."""
         tolerance = self.echo["tolerance"]
         if not self.echo["effects"]:
             return clean_signals(self.network, names, self.clouds, [row], tolerance)[:, 0], None
@@ -140,8 +140,13 @@ class Maker:
         scene = Scene(self.network, self.seed, tolerance, tuple(called(self.echo["effects"])))
         if snr_db is not None:
             scene = scene.at_snr(snr_db)
-        heard = [scene_signals(scene, name, self.clouds, [row], self.occluders) for name in names]
-        return np.stack([signal[0] for signal, _ in heard]), np.stack([power for _, power in heard])
+        echoes = []
+        powers = []
+        for name in names:
+            signals, power = scene_signals(scene, name, self.clouds, [row], self.occluders)
+            echoes.append(signals[0])
+            powers.append(power)
+        return np.stack(echoes), np.stack(powers)
 
     def signal(self, row: dict, snr_db: float, stations: Sequence[int] | None = None) -> np.ndarray:
         """Return the noisy signals of one sample, (stations, symbols) complex64.
@@ -150,9 +155,8 @@ class Maker:
         zeros.
         Raises: InputError naming the sample that cannot be computed.
         """
-        every = range(len(self.network.stations))
-        chosen = list(every if stations is None else stations)
-        result = np.zeros((len(every), self.network.symbols), np.complex64)
+        chosen = list(self._numbers(stations))
+        result = np.zeros((len(self.network.stations), self.network.symbols), np.complex64)
         result[chosen] = self._noisy(row, snr_db, chosen)
         return result
 
@@ -161,40 +165,39 @@ class Maker:
         effects = self.echo["effects"]
         if in_all_cells(effects):
             return self.received(row, snr_db, stations)[0]
+        filtered = None
         passed = filters(effects)
-        filtered = functools.partial(behind, filters=passed) if passed else None
+        if passed:
+            filtered = functools.partial(behind, filters=passed)
         clean, powers = self.received(row, None, stations)
-        return noisy_signals(
-            clean[:, None], [row], self._names(stations), [snr_db], self.seed, powers, filtered
-        )[0, 0]
+        names = self._names(stations)
+        echoes = clean[:, None]
+        signals = noisy_signals(echoes, [row], names, [snr_db], self.seed, powers, filtered)
+        return signals[0, 0]
 
     def late(self, row: dict) -> np.ndarray | None:
-        """Return the delays of a motion model's symbols, (stations, symbols); None if images do not
-        use them.
-        """
+        """Return the delays of a model's symbols, (stations, symbols), None if no image uses them."""
         return lateness(self.render["spectra"], self.echo["effects"], self.network, self.seed, row)
 
     def tile(self, signal: np.ndarray, row: dict, snr_db: float) -> np.ndarray:
-        """Return the tile of one sample of the motion model `row` at an SNR (dB); signal:
-        (stations, symbols).
+        """Return the tile of one sample of the motion model `row` at an SNR (dB).
+
+        signal: (stations, symbols).
         """
-        return self.renderer.tile(
-            signal, late=self.late(row), cubes=self.shown(row, snr_db, signal)
-        )
+        cubes = self.shown(row, snr_db, signal)
+        return self.renderer.tile(signal, late=self.late(row), cubes=cubes)
 
     def png(self, signal: np.ndarray, row: dict, snr_db: float) -> bytes:
-        """Return the PNG file of the tile of one sample of the motion model `row` at an SNR (dB)."""
+        """Return the PNG file of the tile of one sample, as `tile`."""
         return encode(self.tile(signal, row, snr_db), self.images.palette)
 
     def data(
         self, kind: str, signal: np.ndarray, row: dict, snr_db: float, cell_type: str
     ) -> tuple[bytes, dict]:
-        """Return the data of one sample as a shard of a kind holds it, and what its record says of
-        its cubes.
+        """Return the data of one sample as in a shard of a kind, and its record's part on cubes.
 
         kind: "image", "cube", or "signal" and "recipe", which hold the same; signal: (stations,
-        symbols);
-        cell_type: type of the stored cells of cubes, "complex64" or "int16".
+        symbols); cell_type: type of the stored cells of cubes, "complex64" or "int16".
         """
         if kind == "image":
             return self.png(signal, row, snr_db), {}

@@ -28,8 +28,9 @@ STAGES = {
     "tiles": ("tiles/*.npz",),
     "shards": ("shards/*.tar", "shards/*.npz", "shards/index.json"),
 }
-"""Stages in pipeline order, and the files each leaves in a run's folder; tiles are deleted once
-they are in shards.
+"""Stages in the order of the pipeline, and the files that each leaves in a run's folder.
+
+Tiles are deleted once they are in shards.
 """
 
 
@@ -60,25 +61,27 @@ def text(folder: str | Path) -> str:
 
 
 def _checksum(name: str, lines: list[str]) -> str:
-    """Return what a manifest holds for a file or a pattern, of whose files `lines` are in a
-    manifest by files.
+    """Return what a manifest holds for a file or a pattern.
+
+    lines: of its files in a manifest by files.
     """
-    return (
-        hashlib.sha256("".join(lines).encode()).hexdigest()
-        if "*" in name
-        else lines[0].partition(" ")[0]
-    )
+    if "*" in name:
+        return hashlib.sha256("".join(lines).encode()).hexdigest()
+    return lines[0].partition(" ")[0]
 
 
 def by_groups(text: str) -> str:
-    """Return a manifest with one line for each group of files whose names differ in the number of
-    the chunk alone; the clouds are one group."""
+    """Return a manifest with one line for each group of files.
+
+    The names of a group differ in the number of the chunk alone; the clouds are one group.
+    """
     groups = defaultdict(list)
     for line in text.splitlines(keepends=True):
         name = line.split("  ", 1)[1].strip()
-        groups[
-            "clouds/*.npz" if stage_of(name) == "clouds" else re.sub(r"-\d{5}", "-*", name)
-        ].append(line)
+        pattern = re.sub(r"-\d{5}", "-*", name)
+        if stage_of(name) == "clouds":
+            pattern = "clouds/*.npz"
+        groups[pattern].append(line)
     return "".join(f"{_checksum(name, lines)}  {name}\n" for name, lines in groups.items())
 
 
@@ -107,16 +110,18 @@ def read(path: str | Path) -> dict[str, str]:
 def stage_of(name: str) -> str:
     """Return the stage that makes a file of a manifest."""
     folder = name.partition("/")[0]
-    return "noise" if folder == "noisy" else folder
+    if folder == "noisy":
+        return "noise"
+    return folder
 
 
 def faults(
     path: str | Path, folder: str | Path, temporary: tuple[str, ...] = ("tiles",)
 ) -> list[str]:
-    """Return one line for each file that is missing, differs or is not in the manifest, in the
-    order of the stages.
+    """Return one line for each file that is missing, differs or is not in the manifest.
 
-    Files of the stages in `temporary` may be missing. An empty list means that all bytes are equal.
+    The lines are in the order of the stages. Files of the stages in `temporary` may be missing. An
+    empty list means that all bytes are equal.
     Raises: InputError where the manifest cannot be read.
     """
     expected = read(path)
@@ -128,22 +133,17 @@ def faults(
             found = [file for file in unnamed if fnmatchcase(file, name)]
             unnamed = [file for file in unnamed if file not in found]
             if not found:
-                lines += [] if stage in temporary else [f"{stage}: {name} is missing"]
+                if stage not in temporary:
+                    lines.append(f"{stage}: {name} is missing")
             elif _checksum(name, [_line(folder, file) for file in found]) != expected[name]:
                 lines.append(f"{stage}: {name} differs")
-        extra = sorted(unnamed)
-        lines += (
-            []
-            if stage in temporary
-            else [f"{stage}: {name} is not in the manifest" for name in extra]
-        )
+        if stage not in temporary:
+            lines += [f"{stage}: {name} is not in the manifest" for name in sorted(unnamed)]
     return lines
 
 
 def main(arguments: list[str]) -> None:
-    """Write the manifest of a run, or compare a run with one and end with status 1 where a byte
-    differs.
-    """
+    """Write the manifest of a run, or compare a run with one; status 1 where a byte differs."""
     line = argparse.ArgumentParser(
         prog="python -m lowalt.shards.manifest", description=main.__doc__
     )
@@ -161,7 +161,9 @@ def main(arguments: list[str]) -> None:
     options = line.parse_args(arguments)
     if options.command == "write":
         found = text(options.run)
-        write_file(options.manifest, by_groups(found) if options.by_groups else found)
+        if options.by_groups:
+            found = by_groups(found)
+        write_file(options.manifest, found)
         return
     lines = faults(options.manifest, options.run, ("tiles", *options.without))
     for fault in lines:
@@ -170,8 +172,8 @@ def main(arguments: list[str]) -> None:
         print(f"first stage that differs: {lines[0].partition(':')[0]}", file=sys.stderr)
         raise SystemExit(1)
     expected = read(options.manifest)
-    count = f"{len(expected)} {'groups' if any('*' in name for name in expected) else 'files'}"
-    print(f"{options.run}: all {count} are equal to {options.manifest}")
+    unit = "groups" if any("*" in name for name in expected) else "files"
+    print(f"{options.run}: all {len(expected)} {unit} are equal to {options.manifest}")
 
 
 if __name__ == "__main__":

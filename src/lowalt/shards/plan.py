@@ -1,5 +1,4 @@
-"""The plan of a run: its subtypes, chunks and shards, which follow from the configuration before
-any job starts.
+"""The plan of a run: its subtypes, chunks and shards, which follow from the configuration.
 
 A data set can grow without remaking it: subtypes and SNRs under `added` in the configuration get
 their own chunks. If step t (1, 2, ...) of that list adds subtypes, their motion models are in
@@ -7,6 +6,7 @@ chunks {group}-{part}t{t}. If it adds SNRs, there is a chunk {chunk}s{t} for eve
 with the same motion models and echoes.
 """
 
+import itertools
 import math
 from collections.abc import Collection
 from dataclasses import dataclass, replace
@@ -20,7 +20,7 @@ from lowalt.shards.sizes import sample_bytes
 
 GROUPS = ("seen", "unseen")
 PART = r"\d{5}(?:t\d+)?(?:s\d+)?"
-"""Regular expression of a chunk's part."""
+"""Regular expression of {part}, a chunk's name behind its group."""
 PIECE = r"(?:p\d+)?"
 """Regular expression of a shard's piece, if a fold of a chunk is packed into several shards."""
 EVERY = 2**53
@@ -28,16 +28,15 @@ EVERY = 2**53
 
 
 def _refuse_tracks(config: dict) -> None:
-    """Refuse tracks that a split would divide, or whose targets would jump between looks in this
-    scene.
-    """
+    """Refuse tracks that a split would divide, or whose targets would jump between looks."""
     if "looks" not in config["motion"]:
         return
     if config["split"]["by"] != "motion":
         raise InputError(
             f"split.by: {config['split']['by']!r} together with motion.looks, expected 'motion'"
         )
-    if jumping := breaks_tracks(config["effects"]):
+    jumping = breaks_tracks(config["effects"])
+    if jumping:
         raise InputError(
             f"effects: {jumping} together with motion.looks, expected none of them: each draws a "
             "motion for every look, and the looks of a track would not join"
@@ -68,7 +67,7 @@ def _subtypes_by_step(config: dict, published: Collection[str]) -> list[tuple[st
     """
     select = config["targets"]["select"]
     later = [tuple(step.get("subtypes", [])) for step in config.get("added", [])]
-    more = [name for step in later for name in step]
+    more = list(itertools.chain.from_iterable(later))
     unknown = [name for name in (*select, *more) if name not in published]
     if unknown:
         otherwise = f"names of the table, such as {next(iter(published))!r}"
@@ -84,8 +83,9 @@ def _subtypes_by_step(config: dict, published: Collection[str]) -> list[tuple[st
 
 @dataclass(frozen=True)
 class Chunk:
-    """Motion models of some subtypes at some SNRs (dB); `source` is the chunk whose motion and
-    echoes it shares.
+    """Motion models of some subtypes at some SNRs (dB).
+
+    source: the chunk whose motion and echoes it shares; first, count: of the models.
     """
 
     name: str
@@ -118,27 +118,26 @@ class Plan:
 
     @classmethod
     def of(cls, config: dict, published: dict[str, dict]) -> "Plan":
-        """Return the plan of a checked configuration; `published` maps every subtype to its row of
-        the table.
+        """Return the plan of a checked configuration.
 
-        Raises: InputError for a selected subtype the table lacks, one that is selected and added,
-        or a chunk that breaks the blocks of the split.
+        published: the row of every subtype in the table of targets. Raises: InputError for a
+        selected subtype the table lacks, one that is selected and added, or a chunk that breaks the
+        blocks of the split.
         """
         motion = config["motion"]
         split = config["split"]
         _refuse_tracks(config)
         subtypes = _subtypes_by_step(config, published)
         _refuse_split_chunks(motion["models_per_chunk"], split)
-        selected = {name for names in subtypes for name in names}
+        selected = set(itertools.chain.from_iterable(subtypes))
         groups = {}
         for group in GROUPS:
-            members = tuple(
-                name
-                for name in published
-                if name in selected and published[name]["unseen_protocol"] == group
-            )
+            members = []
+            for name, row in published.items():
+                if name in selected and row["unseen_protocol"] == group:
+                    members.append(name)
             if members:
-                groups[group] = members
+                groups[group] = tuple(members)
         snrs = []
         for step in (config["noise"], *config.get("added", [])):
             snrs.append(tuple(float(snr) for snr in step.get("snr_db", [])))
@@ -161,8 +160,10 @@ class Plan:
 
     @cached_property
     def _chunks(self) -> dict[str, Chunk]:
-        """All chunks by name, step by step: subtypes of a step at all SNRs so far, then its SNRs
-        for all chunks.
+        """All chunks by name, step by step.
+
+        A step's SNRs make a chunk for each earlier one; its subtypes make chunks at all SNRs so
+        far.
         """
         chunks: dict[str, Chunk] = {}
         known: tuple[float, ...] = ()
@@ -187,7 +188,7 @@ class Plan:
 
     @property
     def _chunks_of_group(self) -> int:
-        """Number of chunks that hold the motion models of one group, the last one possibly smaller."""
+        """Number of chunks for the motion models of one group; the last one may be smaller."""
         return -(-self.models // self.models_per_chunk)
 
     @property
@@ -229,22 +230,22 @@ class Plan:
         return [name for name in FOLDS if name in dealt]
 
     def pieces(self, chunk: str, fold: str) -> list[str]:
-        """Return the suffixes of a chunk's shards of one fold: an empty one, or p0, p1, ... for
-        several.
-        """
+        """Return the suffixes of a chunk's shards of one fold: "", or p0, p1, ... for several."""
         held = self._chunks[chunk]
         models = held.count * len(held.members) * self.split[fold] / _block_of(self.split)
         # The samples of a motion model stay together.
         count = math.ceil(models / max(1, self.largest // len(held.snrs)))
-        return [f"p{number}" for number in range(count)] if count > 1 else [""]
+        if count <= 1:
+            return [""]
+        return [f"p{number}" for number in range(count)]
 
     @cached_property
     def shards(self) -> list[str]:
         """Names {group}-{fold}-{part}{piece} of all shards."""
         names = []
         for chunk in self.chunks:
-            group, part = chunk.split("-")
+            group, number = chunk.split("-")
             for fold_name in self.folds(chunk):
                 for piece in self.pieces(chunk, fold_name):
-                    names.append(f"{group}-{fold_name}-{part}{piece}")
+                    names.append(f"{group}-{fold_name}-{number}{piece}")
         return names

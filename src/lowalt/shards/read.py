@@ -9,9 +9,9 @@ import hashlib
 import io
 import json
 from collections.abc import Iterable, Iterator
-from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from types import ModuleType
+from typing import NoReturn
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from lowalt.files.atomic import existing, sha256
 from lowalt.files.errors import InputError
 from lowalt.files.json_objects import json_object
 from lowalt.scene.lateness import lateness
+from lowalt.scene.trust import refuse_effects
 from lowalt.shards.clean import complex_signals, noisy, unpacked
 from lowalt.shards.index import WHAT, checked, load
 from lowalt.shards.plan import GROUPS
@@ -49,7 +50,8 @@ def store_of(scheme: str) -> ModuleType:
     stores = offered("stores")
     if scheme not in stores:
         raise InputError(
-            f"{scheme}://: no extension reads such addresses, expected a file or one of {sorted(stores)}"
+            f"{scheme}://: no extension reads such addresses, expected a file or one of "
+            f"{sorted(stores)}"
         )
     return module_offered("stores", scheme, stores[scheme])
 
@@ -76,18 +78,21 @@ class ShardSet:
         Raises: InputError naming an unknown group or fold, or a file that is missing or damaged.
         """
         self._base = str(index_path)
-        self.scheme = self._base.partition("://")[0] if "://" in self._base else ""
-        self.remote = bool(self.scheme)
+        scheme, separator, _ = self._base.partition("://")
+        self.remote = bool(scheme and separator)
+        self.scheme = scheme if self.remote else ""
         self.index_path = self._base if self.remote else Path(index_path)
         self.groups = tuple(groups)
         self.folds = tuple(folds)
         self.check = check
         refuse_unknown(self.groups, self.folds)
         self.index = self._fetched_index() if self.remote else load(index_path)
-        self.kind, self.classes = self.index["kind"], stated(self.index)
-        self.shards = [
-            s for s in self.index["shards"] if s["group"] in self.groups and s["fold"] in self.folds
-        ]
+        self.kind = self.index["kind"]
+        self.classes = stated(self.index)
+        self.shards = []
+        for entry in self.index["shards"]:
+            if entry["group"] in self.groups and entry["fold"] in self.folds:
+                self.shards.append(entry)
         self._ends = np.cumsum([0, *(shard["samples"] for shard in self.shards)])
         self._tables: dict[int, np.ndarray] = {}
 
@@ -122,29 +127,39 @@ class ShardSet:
         if shard not in self._tables:
             entry = self.shards[shard]
             name = table_path(entry["path"])
-            most = entry["samples"] * SAMPLE.itemsize + MOST_OVERHEAD_BYTES
-            place: AbstractContextManager[Path] = nullcontext(Path(self.index_path).parent / name)
             if self.remote:
                 store = store_of(self.scheme)
-                place = store.fetched(store.beside(self._base, name.as_posix()), most)
-            with place as path:
-                samples = map_samples(path)
-                if len(samples) != entry["samples"] or (
-                    self.check and sha256(path) != entry["table_sha256"]
-                ):
-                    raise InputError(
-                        f"{path.name}: damaged or another table: {len(samples)} rows, expected {entry['samples']}, and "
-                        "the SHA-256 that the index states"
-                    )
-            self._tables[shard] = samples
+                address = store.beside(self._base, name.as_posix())
+                most = entry["samples"] * SAMPLE.itemsize + MOST_OVERHEAD_BYTES
+                with store.fetched(address, most) as path:
+                    self._tables[shard] = self._checked_table(path, entry, address)
+            else:
+                path = Path(self.index_path).parent / name
+                self._tables[shard] = self._checked_table(path, entry, str(path))
         return self._tables[shard]
 
-    def tables(self) -> Iterator[tuple[dict, np.ndarray]]:
-        """Yield each shard's entry of the index and its rows (`samples.map_samples`), of one shard
-        at a time.
+    def _checked_table(self, path: Path, entry: dict, named: str) -> np.ndarray:
+        """The rows of a shard's table in a file, checked against the shard's entry of the index.
 
-        Memory does not grow with the number of shards. Raises: InputError naming a table that is
-        missing or damaged.
+        named: what a sentence calls the table, since the copy of a remote one is temporary.
+        """
+        try:
+            samples = map_samples(path)
+        except InputError as error:
+            raise InputError(str(error).replace(str(path), named)) from None
+        whole = len(samples) == entry["samples"]
+        if not whole or (self.check and sha256(path) != entry["table_sha256"]):
+            raise InputError(
+                f"{named}: damaged or another table: {len(samples)} rows, expected "
+                f"{entry['samples']}, and the SHA-256 that the index states"
+            )
+        return samples
+
+    def tables(self) -> Iterator[tuple[dict, np.ndarray]]:
+        """Yield each shard's entry of the index and its rows, of one shard at a time.
+
+        The rows are those of `sample_table.map_samples`. Memory does not grow with the number of
+        shards. Raises: InputError naming a table that is missing or damaged.
         """
         for shard, entry in enumerate(self.shards):
             yield entry, self._table(shard)
@@ -163,30 +178,42 @@ class ShardSet:
 
         Raises: InputError naming shard and sample where it is damaged.
         """
-        shard, place = self._locate(number)
-        row = self._table(shard)[place]
-        first = int(row[f"{member}_offset"])
-        length = int(row[f"{member}_size"])
+        shard, position = self._locate(number)
+        row = self._table(shard)[position]
+        offset = int(row[f"{member}_offset"])
+        size = int(row[f"{member}_size"])
+        if self.check:
+            sample = self._checked_sample(shard, row)
+            start = offset - int(row["offset"])
+            return sample[start : start + size]
         # Without a check, read only the member: a record is about 1 % of its sample's bytes.
-        offset, size = (int(row["offset"]), int(row["size"])) if self.check else (first, length)
-        sample = self._read(shard, offset, size)
-        if len(sample) < size or (
-            self.check and hashlib.sha256(sample).digest() != row["sha256"].tobytes()
-        ):
-            name = Path(self.shards[shard]["path"]).name
-            raise InputError(f"{name}: sample {row['key'].decode()} is damaged (SHA-256 differs)")
-        return sample[first - offset : first - offset + length]
+        content = self._read(shard, offset, size)
+        if len(content) < size:
+            self._refuse_sample(shard, row)
+        return content
+
+    def _checked_sample(self, shard: int, row: np.void) -> bytes:
+        """All bytes of the sample of a row in a shard's table, after its check."""
+        size = int(row["size"])
+        sample = self._read(shard, int(row["offset"]), size)
+        if len(sample) < size or hashlib.sha256(sample).digest() != row["sha256"].tobytes():
+            self._refuse_sample(shard, row)
+        return sample
+
+    def _refuse_sample(self, shard: int, row: np.void) -> NoReturn:
+        """Raise InputError naming the shard and the damaged sample."""
+        name = Path(self.shards[shard]["path"]).name
+        raise InputError(f"{name}: sample {row['key'].decode()} is damaged (SHA-256 differs)")
 
     def _column(self, name: str) -> np.ndarray:
         """One column of the tables of all shards, (n,)."""
-        parts = [self._table(shard)[name] for shard in range(len(self.shards))]
-        return np.concatenate(parts) if parts else np.zeros(0)
+        if not self.shards:
+            return np.zeros(0)
+        return np.concatenate([self._table(shard)[name] for shard in range(len(self.shards))])
 
     @functools.cached_property
     def renderer(self) -> Renderer:
-        """The renderer that turns the signals of these shards into tiles, with the settings of the
-        index.
-        """
+        """The renderer that turns the signals of these shards into tiles, as the index says."""
         return Renderer.from_settings(
             {key: self.index["render"][key] for key in ("network", "spectra", "images")}
         )
@@ -222,10 +249,10 @@ class ShardSet:
         return self._column("snr_db").astype(float)
 
     def members(self, number: int) -> tuple[bytes, bytes]:
-        """Return record and data of a sample as stored; for recipe shards, as a signal shard would
-        store them.
+        """Return record and data of a sample as stored.
 
-        Raises: InputError naming shard and sample where it is damaged.
+        Those of a recipe shard are as a signal shard stores them. Raises: InputError naming shard
+        and sample where it is damaged.
         """
         if self.kind == "recipe":
             return self._record(number), npy(self.signal(number))
@@ -233,15 +260,15 @@ class ShardSet:
 
     def _snr_db(self, number: int) -> float:
         """SNR of a sample (dB)."""
-        shard, place = self._locate(number)
-        return float(self._table(shard)[place]["snr_db"])
+        shard, position = self._locate(number)
+        return float(self._table(shard)[position]["snr_db"])
 
     def _record(self, number: int) -> bytes:
         """The JSON record of a sample."""
         stored = self.stored(number, "record")
-        return (
-            unpacked(json.loads(stored), self._snr_db(number)) if self.kind == "recipe" else stored
-        )
+        if self.kind == "recipe":
+            return unpacked(json.loads(stored), self._snr_db(number))
+        return stored
 
     def record(self, number: int) -> dict:
         """Return the JSON record of a sample.
@@ -260,8 +287,7 @@ class ShardSet:
         return self.stored(number, "data")
 
     def signal(self, number: int) -> np.ndarray:
-        """Return the signals of a sample of a signal, recipe or cube shard, (stations, symbols)
-        complex64.
+        """Return the signals of a sample, (stations, symbols) complex64; not of image shards.
 
         Raises: InputError where these are image shards, or naming shard and sample where it is
         damaged.
@@ -273,9 +299,8 @@ class ShardSet:
         if self.kind == "signal":
             return stored
         stations = station_names(self.index["render"]["network"])
-        return noisy(
-            json.loads(self.stored(number, "record")), stored, stations, self._snr_db(number)
-        )
+        entry = json.loads(self.stored(number, "record"))
+        return noisy(entry, stored, stations, self._snr_db(number))
 
     def cubes(self, number: int) -> list[Cube]:
         """Return the cube of each station of a sample of a cube shard.
@@ -292,32 +317,34 @@ class ShardSet:
 
     def _shown(self, number: int) -> list[Cube] | None:
         """The cubes of a sample if its images need them, else None."""
-        return self.cubes(number) if of_cells(self.spectra) else None
+        if not of_cells(self.spectra):
+            return None
+        return self.cubes(number)
 
     def late(self, number: int) -> np.ndarray | None:
-        """Return the delays of a sample's symbols, (stations, symbols) intervals; None if images do
-        not use them.
+        """Return the delays of a sample's symbols, (stations, symbols) intervals.
+
+        They are None if images do not use them.
         """
         render = self.index["render"]
         effects = (self.index.get("echo") or {}).get("effects", {})
         if render["spectra"].get("times") != "known":
             return None
+        refuse_effects(effects, self.index_path)
         entry = self.record(number)
-        return lateness(
-            render["spectra"], effects, self.renderer.network, entry["seed"], row_of(entry)[0]
-        )
+        row, _ = row_of(entry)
+        return lateness(render["spectra"], effects, self.renderer.network, entry["seed"], row)
 
     def tile(self, number: int) -> np.ndarray:
-        """Return the tile of a sample, (3 S, 3 S) uint8, decoded or rendered; all kinds of shards
-        give the same pixels.
+        """Return the tile of a sample, (3 S, 3 S) uint8, decoded or rendered.
 
-        Raises: InputError naming shard and sample where it is damaged.
+        All kinds of shards give the same pixels. Raises: InputError naming shard and sample where
+        it is damaged.
         """
-        if self.kind != "image":
-            return self.renderer.tile(
-                self.signal(number), late=self.late(number), cubes=self._shown(number)
-            )
-        return decode(self.png(number))[0]
+        if self.kind == "image":
+            return decode(self.png(number))[0]
+        signal = self.signal(number)
+        return self.renderer.tile(signal, late=self.late(number), cubes=self._shown(number))
 
     def images(
         self,
@@ -334,35 +361,35 @@ class ShardSet:
         damaged.
         """
         numbers = self.columns(stations, views)
-        if self.kind != "image":
-            images = self.renderer.some(
-                self.signal(number), numbers, self.late(number), self._shown(number)
-            )
-        else:
+        if self.kind == "image":
             images = split(self.tile(number), len(self.spectra))[numbers]
-        return images if size in (None, images.shape[-1]) else resize(images, size)
+        else:
+            signal = self.signal(number)
+            images = self.renderer.some(signal, numbers, self.late(number), self._shown(number))
+        if size in (None, images.shape[-1]):
+            return images
+        return resize(images, size)
 
     def columns(
         self, stations: Iterable[str] | None = None, views: Iterable[str] | None = None
     ) -> list[int]:
-        """Return the numbers, among all images of a sample, of some stations and views (all by
-        default).
+        """Return the numbers, among all images of a sample, of some stations and views.
 
-        Raises: InputError naming an unknown one.
+        By default they are all stations and all views. Raises: InputError naming an unknown one.
         """
         known = station_names(self.index["render"]["network"])
-        spectra = self.spectra
-        stations = list(known if stations is None else stations)
-        views = list(spectra if views is None else views)
+        spectra = list(self.spectra)
+        stations = known if stations is None else list(stations)
+        views = spectra if views is None else list(views)
         if set(stations) - set(known) or set(views) - set(spectra):
             raise InputError(
-                f"stations {stations} and views {views}, expected some of {known} and of {list(spectra)}"
+                f"stations {stations} and views {views}, expected some of {known} and of {spectra}"
             )
-        return [
-            len(spectra) * known.index(station) + spectra.index(view)
-            for station in stations
-            for view in views
-        ]
+        numbers = []
+        for station in stations:
+            first = len(spectra) * known.index(station)
+            numbers += [first + spectra.index(view) for view in views]
+        return numbers
 
     def _need(self, *kinds: str) -> None:
         """Raise InputError unless the shards are of one of these kinds."""

@@ -1,6 +1,4 @@
-"""The raw echo of one target at one station, at any place of the receiving chain, with its axes and
-the truth.
-"""
+"""The raw echo of one target at one station, anywhere in the receiving chain, with the truth."""
 
 import math
 from collections.abc import Iterable
@@ -65,17 +63,20 @@ class RawEcho:
         return np.array(self.values, dtype, copy=copy)
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """Return everything by name, as a file holds it: the fields, each entry of the truth by its
-        own name, and each of the companions' with `others_` before it.
+        """Return everything by name, as a file holds it.
+
+        These are the fields, each entry of the truth by its own name, and each of the companions'
+        with `others_` before it.
         """
-        own = {
-            field.name: np.asarray(getattr(self, field.name))
-            for field in fields(self)
-            if field.name not in ("truth", "others")
-        }
-        own["companions"] = np.array(self.companions, dtype=np.str_)
-        others = {f"others_{name}": values for name, values in self.others.items()}
-        return own | self.truth | others
+        result = {}
+        for field in fields(self):
+            if field.name not in ("truth", "others"):
+                result[field.name] = np.asarray(getattr(self, field.name))
+        result["companions"] = np.array(self.companions, dtype=np.str_)
+        result |= self.truth
+        for name, values in self.others.items():
+            result[f"others_{name}"] = values
+        return result
 
 
 @one_blas_thread()
@@ -87,8 +88,7 @@ def receive(
     at: str = "cells",
     snr_db: float = math.inf,
 ) -> RawEcho:
-    """Return the echo of a motion model of a subtype at a station, at one place of the chain, in
-    sqrt(W).
+    """Return the echo of a motion model at a station, at one place of the chain, in sqrt(W).
 
     configuration: overlays on the embedded default, each a path or a dict, a whole configuration,
     or a `Dataset`; station: the first one by default. Only this target and the others that the
@@ -122,7 +122,9 @@ def receive(
         raise InputError(f"at is {at!r}, expected one of {list(AT)}")
     if not isinstance(model, (int, np.integer)) or model < 0:
         raise InputError(f"model is {model!r}, expected a whole number from 0")
-    dataset = configuration if isinstance(configuration, Dataset) else alone(configuration, subtype)
+    if not isinstance(configuration, Dataset):
+        configuration = alone(configuration, subtype)
+    dataset: Dataset = configuration
     network = dataset.maker.network
     there = network.station(station or network.stations[0].name)
     row = dataset.row(dataset.place_of(subtype, int(model), snr_db))
@@ -152,17 +154,28 @@ def _values(dataset: Dataset, sample: SceneSample, at: str, snr_db: float) -> np
         return sample.received().signal
     if at == "receiver":
         values = sample.arrived()
+    elif at == "cells":
+        values = _of_all_symbols(sample, sample.cells)
     else:
-        received = sample.cells if at == "cells" else sample.filtered(sample.detection)
-        values = np.zeros((len(sample.view.times_s), received.shape[1]), np.complex128)
-        values[slice(None) if sample.view.sampling is None else sample.view.sampling.present] = (
-            received
-        )
+        values = _of_all_symbols(sample, sample.filtered(sample.detection))
     if set_snr and not any(effect.offers("SET_SNR") for effect in scene.effects):
         rng = stream(scene.seed, "cells", row["subtype"], row["model"], station.name, snr_db)
         noise = add_noise(np.zeros(values.shape), snr_db, rng, sample.power)
-        values = values + (np.fft.fft(noise, axis=1) if at == "receiver" else noise)
+        if at == "receiver":
+            noise = np.fft.fft(noise, axis=1)
+        values = values + noise
     return values
+
+
+def _of_all_symbols(sample: SceneSample, received: np.ndarray) -> np.ndarray:
+    """Range cells of all symbols, zeros at those that are not received."""
+    view = sample.view
+    result = np.zeros((len(view.times_s), received.shape[1]), np.complex128)
+    if view.sampling is None:
+        result[:] = received
+    else:
+        result[view.sampling.present] = received
+    return result
 
 
 def _described(
@@ -170,43 +183,44 @@ def _described(
 ) -> RawEcho:
     """The values with their axes and the truth."""
     view = sample.view
-    none = np.empty(0)
     station: Station = view.station
-    frequencies_hz = (
-        station.frequency_hz + np.arange(network.subcarriers) * network.subcarrier_spacing_hz
-    )
-    columns = true_columns(sample, view)
-    of_part = of_parts(view)
-    truth = dict(zip(TRUTH, columns.T, strict=True))
-    truth |= dict(zip(("part_range_m", "part_low_mps", "part_high_mps"), of_part, strict=True))
-    beside = sample.targets[1:]
-    columns_beside = np.empty((len(beside), len(TRUTH), len(view.times_s)))
-    for number, other in enumerate(beside):
-        columns_beside[number] = true_columns(sample, other).T
-    others = {name: columns_beside[:, number] for number, name in enumerate(TRUTH)}
-    even = at == "signal" and all(even() for even in sample.all("even").values())
+    frequencies_hz: np.ndarray = np.empty(0)
+    if at in ("subcarriers", "receiver"):
+        offsets_hz = np.arange(network.subcarriers) * network.subcarrier_spacing_hz
+        frequencies_hz = station.frequency_hz + offsets_hz
+    ranges_m: np.ndarray = np.empty(0)
+    if at in ("cells", "canceller"):
+        ranges_m = np.arange(values.shape[1]) * network.cell_m
+    times_s = view.times_s
+    if at == "signal" and all(even() for even in sample.all("even").values()):
+        times_s = network.times_s
+    truth = dict(zip(TRUTH, true_columns(sample, view).T, strict=True))
+    of_each_part = ("part_range_m", "part_low_mps", "part_high_mps")
+    truth |= dict(zip(of_each_part, of_parts(view), strict=True))
+    companions = sample.targets[1:]
+    of_companions = np.empty((len(companions), len(TRUTH), len(view.times_s)))
+    for number, other in enumerate(companions):
+        of_companions[number] = true_columns(sample, other).T
     return RawEcho(
-        values,
-        network.times_s if even else view.times_s,
-        frequencies_hz if at in ("subcarriers", "receiver") else none,
-        np.arange(values.shape[1]) * network.cell_m if at in ("cells", "canceller") else none,
-        network.bin_speeds_mps(len(values), station),
-        truth,
-        view.cloud.names,
-        tuple(other.row["subtype"] for other in beside),
-        others,
-        view.row["subtype"],
-        int(view.row["model"]),
-        station.name,
-        at,
-        snr_db,
+        values=values,
+        times_s=times_s,
+        frequencies_hz=frequencies_hz,
+        ranges_m=ranges_m,
+        speeds_mps=network.bin_speeds_mps(len(values), station),
+        truth=truth,
+        parts=view.cloud.names,
+        companions=tuple(other.row["subtype"] for other in companions),
+        others={name: of_companions[:, number] for number, name in enumerate(TRUTH)},
+        subtype=view.row["subtype"],
+        model=int(view.row["model"]),
+        station=station.name,
+        at=at,
+        snr_db=snr_db,
     )
 
 
 def write(echo: RawEcho, path: Path) -> list[Path]:
-    """Write an echo's arrays by name as `path`.npz and, where h5py is installed, as `path`.h5;
-    return the files.
-    """
+    """Write an echo's arrays by name to `path`.npz, with h5py also `path`.h5; return the files."""
     written = [path.with_name(f"{path.name}.npz")]
     with replacing(written[0]) as temporary:
         np.savez(temporary, **echo.arrays())  # type: ignore[arg-type]
@@ -217,5 +231,7 @@ def write(echo: RawEcho, path: Path) -> list[Path]:
     written.append(path.with_name(f"{path.name}.h5"))
     with replacing(written[1]) as temporary, h5py.File(temporary, "w") as file:
         for name, array in echo.arrays().items():
-            file[name] = array.astype(h5py.string_dtype()) if array.dtype.kind == "U" else array
+            if array.dtype.kind == "U":
+                array = array.astype(h5py.string_dtype())
+            file[name] = array
     return written

@@ -95,7 +95,9 @@ def _word(kind: Type) -> str:
     """A type in a message."""
     if isinstance(kind, dict):
         return "mapping"
-    return "list" if isinstance(kind, ListOf) else str(kind)
+    if isinstance(kind, ListOf):
+        return "list"
+    return str(kind)
 
 
 def column(name: str, kind: Type) -> dict:
@@ -107,9 +109,13 @@ def _written(name: str, kind: Type) -> dict:
     """The type of a field in the hub's words."""
     if isinstance(kind, dict):
         return {"struct": [column(*field) for field in kind.items()]}
+    if kind is None:
+        return {"dtype": NULL}
     if not isinstance(kind, ListOf):
-        return {"dtype": NULL if kind is None else kind}
-    item = EMPTY.get(name, UNDECLARED) if kind.item is None else kind.item
+        return {"dtype": kind}
+    item = kind.item
+    if item is None:
+        item = EMPTY.get(name, UNDECLARED)
     # Inside a list, a scalar stands by its name and a mapping as its fields.
     inner = _written("", item)
     return {"list": inner.get("dtype") or inner.get("struct") or inner}

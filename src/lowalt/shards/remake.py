@@ -1,6 +1,4 @@
-"""Recomputes a stored sample from its record, the index and the target's cloud, and compares every
-byte.
-"""
+"""Recomputes a stored sample from its record, the index and the cloud, and compares every byte."""
 
 import json
 from collections.abc import Iterator, Mapping
@@ -53,16 +51,15 @@ class Remaker:
     def __init__(
         self, shards: ShardSet, clouds: Mapping[str, Cloud], occluders: dict | None = None
     ) -> None:
-        """Take the data set and the clouds by subtype; occluders: each subtype's surfaces, where
-        effects need them.
+        """Take the data set and the clouds by subtype.
 
-        Raises: InputError where the index does not say how echoes were computed, or names code
-        among the effects.
+        occluders: each subtype's surfaces, where effects need them. Raises: InputError where the
+        index does not say how echoes were computed, or names code among the effects.
         """
         if not shards.index.get("echo"):
             raise InputError(
-                f"{shards.index_path}: does not say how echoes were computed, expected an index that lowalt 0.2 or "
-                f"later wrote, found format {shards.index['format']}"
+                f"{shards.index_path}: does not say how echoes were computed, expected an index "
+                f"that lowalt 0.2 or later wrote, found format {shards.index['format']}"
             )
         refuse_effects(shards.index["echo"]["effects"], shards.index_path)
         self.shards = shards
@@ -98,13 +95,12 @@ class Remaker:
         row, snr_db = row_of(entry)
         seed = entry["seed"]
         signal = self.signal(entry)
-        data, cubes = self._maker(seed).data(
-            self.shards.kind, signal, row, snr_db, cell_type_of(entry)
-        )
+        maker = self._maker(seed)
+        data, cubes = maker.data(self.shards.kind, signal, row, snr_db, cell_type_of(entry))
         row = accompanied(row, self._recorded, seed, self.network)
-        return record(
-            row, snr_db, entry["fold"], seed, self.network, self.shards.classes, cubes
-        ), data
+        classes = self.shards.classes
+        again = record(row, snr_db, entry["fold"], seed, self.network, classes, cubes)
+        return again, data
 
     def faults(self, number: int) -> list[str]:
         """Return one line for each member of a sample that differs from the stored one.
@@ -113,32 +109,31 @@ class Remaker:
         """
         stored, data = self.shards.members(number)
         key = self.shards.keys[number].decode()
-        again = self.made(json.loads(stored))
-        members = zip(("record", self.shards.kind), (stored, data), again, strict=True)
-        return [
-            f"sample {key}: its {name} comes out otherwise"
-            for name, old, new in members
-            if old != new
-        ]
+        stored_again, data_again = self.made(json.loads(stored))
+        lines = []
+        if stored_again != stored:
+            lines.append(f"sample {key}: its record comes out otherwise")
+        if data_again != data:
+            lines.append(f"sample {key}: its {self.shards.kind} comes out otherwise")
+        return lines
 
 
-def place_of(shards: ShardSet, key: str) -> int:
+def number_of(shards: ShardSet, key: str) -> int:
     """Return the number of the sample with this key.
 
     Raises: InputError where the data set has none.
     """
-    places = np.flatnonzero(shards.keys == key.encode())
-    if not len(places):
+    numbers = np.flatnonzero(shards.keys == key.encode())
+    if not len(numbers):
         raise InputError(
-            f"--sample {key!r}: not in {shards.index_path}, expected a key such as {shards.keys[0].decode()!r}"
+            f"--sample {key!r}: not in {shards.index_path}, expected a key such as "
+            f"{shards.keys[0].decode()!r}"
         )
-    return int(places[0])
+    return int(numbers[0])
 
 
 def some(shards: ShardSet, count: int) -> list[int]:
-    """Return the numbers of `count` samples drawn with the index's checksum as seed, or of all if
-    there are fewer.
-    """
+    """Return the numbers of `count` samples, drawn with the index's checksum as seed, or of all."""
     draws = stream(0, "remake", shards.index["sha256"])
     return sorted(draws.choice(len(shards), min(count, len(shards)), replace=False).tolist())
 

@@ -33,8 +33,9 @@ class Place(NamedTuple):
 
 
 def snr_label(snr_db: float) -> str:
-    """Return an SNR for a key: `snrinf`, `snr003`, `snr-60`, `snr003p5` (no dots, which end a key
-    in a tar).
+    """Return an SNR for a key: `snrinf`, `snr003`, `snr-60`, `snr003p5`.
+
+    It has no dots, since a dot ends a key in a tar.
     """
     if math.isinf(snr_db):
         return "snrinf"
@@ -65,8 +66,7 @@ def refuse_unknown(groups: Iterable[str], folds: Iterable[str]) -> None:
 
 
 class SampleList:
-    """The samples of a plan by number: group by group, model by model, subtype by subtype, SNR by
-    SNR.
+    """The samples of a plan by number: by group, then model, then subtype, then SNR.
 
     `classes` are those of the table of targets, by label; `groups` and `folds` those that were
     chosen.
@@ -79,11 +79,10 @@ class SampleList:
         groups: Iterable[str] = GROUPS,
         folds: Iterable[str] = FOLDS,
     ) -> None:
-        """Choose groups and folds of a plan; published: the row of each subtype in the table of
-        targets.
+        """Choose groups and folds of a plan.
 
-        Raises: InputError for a group or fold that no data set has, and for a category that is no
-        word.
+        published: the row of each subtype in the table of targets. Raises: InputError for a group
+        or fold that no data set has, and for a category that is no word.
         """
         groups = tuple(groups)
         self.folds = tuple(folds)
@@ -97,14 +96,13 @@ class SampleList:
 
     @functools.cached_property
     def _numbers(self) -> np.ndarray | None:
-        """Numbers of the chosen folds' samples, counted over all folds; None if all folds are
-        chosen.
-        """
+        """Numbers of the chosen folds' samples, counted over all folds; None for all folds."""
         if set(self.folds) == set(FOLDS):
             return None
-        chosen = [
-            number for number in range(self._all) if self.fold(self._of_all(number)) in self.folds
-        ]
+        chosen = []
+        for number in range(self._all):
+            if self.fold(self._of_all(number)) in self.folds:
+                chosen.append(number)
         return np.array(chosen, np.int64)
 
     @property
@@ -114,7 +112,9 @@ class SampleList:
         return subtypes * self.plan.models * len(self.plan.snrs)
 
     def __len__(self) -> int:
-        return self._all if self._numbers is None else len(self._numbers)
+        if self._numbers is None:
+            return self._all
+        return len(self._numbers)
 
     def _of_all(self, number: int) -> Place:
         """Return the sample with this number, counted over all folds."""
@@ -131,7 +131,9 @@ class SampleList:
         number = int(number)
         if not 0 <= number < len(self):
             raise IndexError(f"sample {number}: expected 0 to {len(self) - 1}")
-        return self._of_all(number if self._numbers is None else int(self._numbers[number]))
+        if self._numbers is not None:
+            number = int(self._numbers[number])
+        return self._of_all(number)
 
     def __iter__(self) -> Iterator[Place]:
         return (self[number] for number in range(len(self)))
@@ -148,8 +150,9 @@ class SampleList:
         raise InputError(f"subtype is {subtype!r}, expected one of {known}")
 
     def models_from(self, first: int, step: int = 1) -> Iterator[Place]:
-        """Yield the samples of motion models first, first + step, ... of the chosen groups and
-        folds, endlessly.
+        """Yield the samples of models first, first + step, ... of the chosen groups and folds.
+
+        The sequence has no end.
         """
         for model in itertools.count(first, step):
             for group in self.groups:
@@ -170,9 +173,7 @@ class SampleList:
         return np.array([self.label_of[place.subtype] for place in self], np.int64)
 
     def columns(self) -> dict[str, np.ndarray]:
-        """Return arrays (n,) of all samples: key, subtype, model, snr_db (dB), group, fold and
-        label.
-        """
+        """Return arrays (n,) of all samples: key, subtype, model, snr_db, group, fold, label."""
         places = list(self)
         return {
             "key": np.array([place.key for place in places]),

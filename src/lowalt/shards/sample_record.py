@@ -1,5 +1,4 @@
-"""The bytes of a sample: its place in the shuffled order, its JSON record, its signals as an .npy
-file.
+"""The bytes of a sample: its rank in the shuffled order, its JSON record, its signals as .npy.
 
 Every field has one type in all records, and no value is missing, so that tables with typed columns
 (Arrow) hold them.
@@ -40,47 +39,50 @@ release before it.
 
 def rank(seed: int, subtype: str, model: int, snr_db: float) -> bytes:
     """Return the digest that orders a shard's samples: a shuffle by each sample's name alone."""
-    return digest(seed, "order", subtype, model, "inf" if math.isinf(snr_db) else float(snr_db))
+    level = "inf" if math.isinf(snr_db) else float(snr_db)
+    return digest(seed, "order", subtype, model, level)
 
 
 def encoded(content: dict) -> bytes:
-    """Return a record as JSON; an SNR of infinity is 1e999, a number by JSON's grammar that readers
-    take as infinity.
+    """Return a record as JSON; an SNR of infinity is written as 1e999.
 
-    Raises: ValueError for any other number that is not finite.
+    This is a number by JSON's grammar, and readers take it as infinity. Raises: ValueError for any
+    other number that is not finite.
     """
 
     def number(snr: float) -> str:
         """One SNR as a number of JSON."""
-        return "1e999" if snr == math.inf else json.dumps(snr, allow_nan=False)
+        if snr == math.inf:
+            return "1e999"
+        return json.dumps(snr, allow_nan=False)
 
-    snr_db = content["snr_db"]
-    texts = {
-        name: json.dumps(value, separators=(",", ":"), allow_nan=False)
-        for name, value in content.items()
-        if name != "snr_db"
-    }
-    texts["snr_db"] = (
-        f"[{','.join(map(number, snr_db))}]" if isinstance(snr_db, list) else number(snr_db)
-    )
-    return ("{" + ",".join(f'"{name}":{texts[name]}' for name in content) + "}").encode()
+    fields = []
+    for name, value in content.items():
+        if name != "snr_db":
+            text = json.dumps(value, separators=(",", ":"), allow_nan=False)
+        elif isinstance(value, list):
+            text = f"[{','.join(map(number, value))}]"
+        else:
+            text = number(value)
+        fields.append(f'"{name}":{text}')
+    return ("{" + ",".join(fields) + "}").encode()
 
 
 def geometry(row: dict, network: Network) -> dict[str, dict[str, float]]:
-    """Return range, direction and speed of the target's reference point from each station at the
-    first symbol.
+    """Return range, direction and speed of the target from each station at the first symbol.
 
-    range_m; psi and omega, the direction cosines along the array's horizontal and vertical axis;
-    radial_mps, positive receding; NaN where the row has no place, as a measured target's. A link
-    has the means of both stations' ranges and speeds, and the cosines of its receiver. Source:
-    paper, Eq. 4, written with direction cosines.
+    They are those of its reference point: range_m; psi and omega, the direction cosines along the
+    array's horizontal and vertical axis; radial_mps, positive receding; NaN where the row has no
+    position, as a measured target's. A link has the means of both stations' ranges and speeds, and
+    the cosines of its receiver. Source: paper, Eq. 4, written with direction cosines.
     """
     result = {}
     for station in network.stations:
         seen = _seen(row, station)
         if station.transmitter is not None:
             sent = _seen(row, station.transmitter)
-            seen |= {name: 0.5 * (seen[name] + sent[name]) for name in ("range_m", "radial_mps")}
+            for name in ("range_m", "radial_mps"):
+                seen[name] = 0.5 * (seen[name] + sent[name])
         result[station.name] = seen
     return result
 
@@ -89,7 +91,9 @@ def _seen(row: dict, station: Station) -> dict[str, float]:
     """Range, direction and speed of the target's reference point, seen by one station's array."""
     offset = np.array([row["x_m"], row["y_m"], row["z_m"]]) - np.array(station.position_m)
     distance = float(norm(offset))
-    towards = offset / distance if distance != 0 else np.zeros(3)
+    towards = np.zeros(3)
+    if distance != 0:
+        towards = offset / distance
     speed = np.array([row["vx_mps"], row["vy_mps"], row["vz_mps"]])
     return {
         "range_m": distance,
@@ -108,8 +112,7 @@ def record(
     classes: tuple[str, ...] = CATEGORIES,
     cubes: dict | None = None,
 ) -> bytes:
-    """Return the JSON record of one sample: name, class, motion, geometry for each station, seed
-    and versions.
+    """Return the JSON record of one sample: name, class, motion, geometry, seed and versions.
 
     row: a row of the motion table; a number that does not apply to the target is NaN there and 0
     here. `noise` says whether noise was added; where none was, `snr_db` is infinite. Numbers that
@@ -123,9 +126,10 @@ def record(
     names = NAMES + TRACK * (TRACK[0] in row)
     motion = {name: value for name, value in row.items() if name not in (*names, "fold", ADDED)}
     added = row.get(ADDED, {})
-    if taken := sorted({*OWN, *names} & set(added)):
+    taken = sorted({*OWN, *names} & set(added))
+    if taken:
         raise InputError(f"effects: one adds {taken} to records, expected other names of fields")
-    blank = None if math.isnan(row["x_m"]) else 0.0
+    unknown_position = math.isnan(row["x_m"])
     content = {
         "key": sample_key(row["subtype"], row["model"], snr_db),
         "label": label(classes, row),
@@ -135,31 +139,37 @@ def record(
         "snr_db": float(snr_db),
         "noise": not math.isinf(snr_db),
         "seed": seed,
-        "motion": {
-            name: blank if math.isnan(value) else float(value) for name, value in motion.items()
-        },
-        "geometry": {
-            station: {name: None if math.isnan(value) else value for name, value in seen.items()}
-            for station, seen in geometry(row, network).items()
-        },
-        **({"cube": cubes} if cubes else {}),
-        "versions": {"lowalt": DATA_VERSION},
+        "motion": _without_nan(motion, None if unknown_position else 0.0),
+        "geometry": {},
     }
+    for station, seen in geometry(row, network).items():
+        content["geometry"][station] = _without_nan(seen, None)
+    if cubes:
+        content["cube"] = cubes
+    content["versions"] = {"lowalt": DATA_VERSION}
     return encoded(content)
 
 
+def _without_nan(numbers: dict[str, float], blank: float | None) -> dict[str, float | None]:
+    """The numbers by name, with `blank` in place of NaN."""
+    result: dict[str, float | None] = {}
+    for name, value in numbers.items():
+        result[name] = blank if math.isnan(value) else float(value)
+    return result
+
+
 def accompanied(row: dict, effects: Sequence[NamedEffect], seed: int, network: Network) -> dict:
-    """Return the row with what effects say of its sample at the key ADDED; the row alone without
-    effects.
-    """
-    return {**row, ADDED: record_fields(effects, network, seed, row)} if effects else row
+    """Return the row with what effects, if there are any, say of its sample at the key ADDED."""
+    if not effects:
+        return row
+    return {**row, ADDED: record_fields(effects, network, seed, row)}
 
 
 def row_of(entry: dict) -> tuple[dict, float]:
-    """Return the motion table's row (0 where a number does not apply) and the SNR (dB) that a
-    record holds.
+    """Return the row of the motion table and the SNR (dB) that a record holds.
 
-    Raises: InputError naming the sample where the record is of an older format.
+    The row has 0 where a number does not apply. Raises: InputError naming the sample where the
+    record is of an older format.
     """
     if "noise" not in entry:
         made_by = entry.get("versions", {}).get("lowalt", "an unknown version")
@@ -172,17 +182,14 @@ def row_of(entry: dict) -> tuple[dict, float]:
 
 
 def npy(signals: np.ndarray) -> bytes:
-    """Return signals (stations, symbols) complex64 as the bytes of an .npy file of float32
-    (stations, symbols, 2).
+    """Return signals (stations, symbols) complex64 as an .npy file of float32 (..., 2).
 
     The last axis is real and imaginary part: Arrow, which many readers use, has no complex numbers.
     """
-    parts = parts_of(signals)
-    return npy_header("<f4", parts.shape) + parts.tobytes()
+    pairs = real_and_imaginary(signals)
+    return npy_header("<f4", pairs.shape) + pairs.tobytes()
 
 
-def parts_of(values: np.ndarray) -> np.ndarray:
-    """Return complex64 values (...) as float32 (..., 2), real and imaginary part, in the byte order
-    of files.
-    """
+def real_and_imaginary(values: np.ndarray) -> np.ndarray:
+    """Return complex64 values (...) as float32 (..., 2), in the byte order of files."""
     return np.ascontiguousarray(values, "<c8").view("<f4").reshape(*values.shape, 2)

@@ -1,5 +1,4 @@
-"""Writes tar files: members have fixed owner, mode and time, so that equal samples give equal
-bytes.
+"""Writes tar files in which equal samples give equal bytes: fixed owner, mode and time.
 
 The layout equals that of webdataset's `TarWriter(encoder=False, mtime=0)`: USTAR headers, members
 of a sample side by side in the order of their extensions, two empty blocks at the end, the file
@@ -33,8 +32,9 @@ def member(name: str, data: bytes) -> bytes:
 
 @dataclass(frozen=True)
 class Span:
-    """Position of a sample in its shard (bytes): of the whole sample and of the data of its two
-    members.
+    """Position of a sample in its shard (bytes).
+
+    offset, size: of the whole sample; record, data: (offset, size) of its two members' contents.
     """
 
     offset: int
@@ -59,23 +59,21 @@ class Writer:
         self.size += len(data)
 
     def add(self, key: str, record: bytes, extension: str, data: bytes) -> Span:
-        """Append the members {key}.json and {key}.{extension}, in alphabetical order; return their
-        position.
+        """Append the members {key}.json and {key}.{extension} in alphabetical order.
+
+        Return their position.
         """
         if "." in key or "/" in key:
             raise InputError(f"sample key {key!r}: expected no dot and no slash")
         offset = self.size
-        places = {}
-        parts: list[bytes] = []
+        written = b""
+        positions = {}
         for name, content in sorted({"json": record, extension: data}.items()):
-            start = offset + sum(map(len, parts)) + tarfile.BLOCKSIZE
-            places[name] = (start, len(content))
-            parts.append(member(f"{key}.{name}", content))
-        span = b"".join(parts)
-        self._put(span)
-        return Span(
-            offset, len(span), places["json"], places[extension], hashlib.sha256(span).digest()
-        )
+            positions[name] = (offset + len(written) + tarfile.BLOCKSIZE, len(content))
+            written += member(f"{key}.{name}", content)
+        self._put(written)
+        digest = hashlib.sha256(written).digest()
+        return Span(offset, len(written), positions["json"], positions[extension], digest)
 
     def close(self) -> str:
         """Write the end of the archive; return the SHA-256 of the whole file in hexadecimal."""

@@ -12,14 +12,14 @@ from lowalt.files.errors import InputError
 from lowalt.shards import checksums
 from lowalt.shards.index import load
 from lowalt.shards.sample_table import map_samples, table_path
+from lowalt.shards.tar import RECORD
 
 FROZEN = "clouds", "motion"
 """Folders of a run whose files the first training freezes."""
 
 
 def faults(index_path: str | Path) -> Iterator[str]:
-    """Yield one line per fault of a published data set: the file, the sample if it is in one, and
-    what is wrong.
+    """Yield one line per fault of a published data set: the file, the sample, and what is wrong.
 
     First the shards and their tables are checked against the index. Then come all other files of
     the folder, against SHA256SUMS (a file without checksum is a fault), and the clouds and motion
@@ -32,7 +32,9 @@ def faults(index_path: str | Path) -> Iterator[str]:
         yield from shard_faults(folder / entry["path"], entry)
     yield from checksums.faults(index_path, index)
     run = folder.resolve().parent
-    present = {f"{stage}/{path.name}" for stage in FROZEN for path in (run / stage).glob("*")}
+    present: set[str] = set()
+    for stage in FROZEN:
+        present |= {f"{stage}/{path.name}" for path in (run / stage).glob("*")}
     for name, checksum in frozen(index_path).items():
         if name not in present:
             yield f"../{name}: missing"
@@ -41,14 +43,15 @@ def faults(index_path: str | Path) -> Iterator[str]:
 
 
 def frozen(index_path: str | Path) -> dict[str, str]:
-    """Return the checksums, by file, of the clouds and motion tables of the run that contains the
-    index.
+    """Return the checksums, by file, of the clouds and motion tables of the index's run.
 
     The first training writes them into SHA256SUMS of the run's folder; without that file the result
     is empty.
     """
     path = Path(index_path).resolve().parent.parent / checksums.NAME
-    lines = checksums.LINE.findall(path.read_text(errors="replace")) if path.is_file() else []
+    if not path.is_file():
+        return {}
+    lines = checksums.LINE.findall(path.read_text(errors="replace"))
     return {name: checksum for checksum, name in lines if name.partition("/")[0] in FROZEN}
 
 
@@ -72,11 +75,12 @@ def shard_faults(path: Path, entry: dict) -> Iterator[str]:
     except InputError:
         yield f"{path.name}: damaged, and its table cannot tell where"
         return
-    yield from (f"{path.name}: {line}" for line in _locate(path, samples, entry["bytes"]))
+    for line in _locate(path, samples, entry["bytes"]):
+        yield f"{path.name}: {line}"
 
 
 def _locate(path: Path, samples: np.ndarray, expected: int) -> Iterator[str]:
-    """Faults of a shard known to be damaged, sample by sample, then those of the remaining bytes."""
+    """Faults of a shard known to be damaged, sample by sample, then those of the other bytes."""
     size = path.stat().st_size
     if size != expected:
         yield f"{size} bytes, expected {expected}"
@@ -96,8 +100,11 @@ def _locate(path: Path, samples: np.ndarray, expected: int) -> Iterator[str]:
                 yield f"sample {key} is damaged (SHA-256 differs)"
                 named = True
         file.seek(end)
-        tail = file.read()
-    if tail.strip(b"\0") or len(tail) < 2 * BLOCKSIZE:
+        # A damaged table may leave nearly the whole shard.
+        ended = max(0, size - end) >= 2 * BLOCKSIZE
+        while ended and (tail := file.read(RECORD)):
+            ended = not tail.strip(b"\0")
+    if not ended:
         yield "the end of the archive is damaged"
     elif not named:
         yield "SHA-256 differs"

@@ -1,4 +1,4 @@
-"""Time-frequency spectra of symbol-domain signals: VRP, TRP and VT (paper, section IV-B to IV-E)."""
+"""Time-frequency spectra of symbol-domain signals: VRP, TRP, VT (paper, sections IV-B to IV-E)."""
 
 from lowalt.spectra.catalogue import NAMES, Spectra, spectrum, zero_index
 from lowalt.spectra.definitions import trp, vrp, vt

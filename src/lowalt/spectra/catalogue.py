@@ -15,21 +15,21 @@ from typing import Any
 from lowalt.config.command import pick
 from lowalt.config.extensions import module_offered, offered
 from lowalt.files.errors import InputError
-from lowalt.spectra.interface import KnowsTimes, OfCells, Spectrum
+from lowalt.spectra.interface import ZERO_SIGNED, KnowsTimes, OfCells, Spectrum
 from lowalt.spectra.settings import windows
 
 LISTED = ("vrp", "trp", "vt")
 """The paper's three, in its order. Any other module comes after them, in alphabetical order."""
-_FOUND = sorted(
-    path.stem for path in (Path(__file__).parent / "kinds").glob("*.py") if path.stem != "__init__"
-)
+_FILES = (Path(__file__).parent / "kinds").glob("*.py")
+_FOUND = sorted(path.stem for path in _FILES if path.stem != "__init__")
 ADDED: dict[str, str] = offered("spectra")
 """Modules of the spectra that extensions add, by name."""
 NAMES = (*LISTED, *(name for name in _FOUND if name not in LISTED), *ADDED)
 """Names of all spectra."""
 TIMES = "times"
-"""Key of the block `spectra` that is not a spectrum: whether spectra use the instants of received
-symbols.
+"""Key of the block `spectra` that is not a spectrum.
+
+It says whether spectra use the instants of received symbols.
 """
 INSTANTS = ("even", "known")
 
@@ -80,12 +80,13 @@ def of_cells(block: Iterable[str]) -> list[str]:
 
 def zero_index(name: str) -> int:
     """Return the index (0..255) that stands for the value zero in the images of a spectrum."""
-    return 128 if spectrum(name).SIGNED else 0
+    return ZERO_SIGNED if spectrum(name).SIGNED else 0
 
 
 MOST_VALUES = 2**26
-"""Limit on the values of a spectrum and of its tables for all stations; each takes about 16 bytes
-of memory.
+"""Limit on the values of a spectrum and of its tables for all stations.
+
+Each takes about 16 bytes of memory.
 """
 
 
@@ -93,8 +94,7 @@ class Spectra(Mapping[str, Any]):
     """The settings of a data set's spectra by name, in the order of the columns of its tiles."""
 
     def __init__(self, times: str = "even", **settings: Any) -> None:
-        """settings: a `Settings` for each spectrum; without any, the paper's three with their
-        defaults.
+        """settings: a `Settings` for each spectrum; without any, the paper's three by default.
 
         times: "even", symbols are taken as evenly spaced; "known", lines are fitted at the received
         symbols' instants.
@@ -140,23 +140,27 @@ class Spectra(Mapping[str, Any]):
         return len(self._settings)
 
     def check(self, symbols: int, stations: int = 1, subcarriers: int | None = None) -> None:
-        """Refuse signals that are too short for a window, spectra of gigabytes, and more range
-        cells than the band has.
+        """Refuse signals that are too short for a window.
+
+        Spectra of gigabytes, and more range cells than the band has, are refused, too.
 
         Raises: InputError naming the spectrum whose window is no shorter than the signal, or that
         is too large.
         """
         for name, settings in self.items():
-            if isinstance(spectrum(name), OfCells):
+            kind = spectrum(name)
+            if isinstance(kind, OfCells):
                 if subcarriers is not None and settings.cells > subcarriers:
                     raise InputError(
-                        f"spectra.{name}.cells is {settings.cells}, expected at most the {subcarriers} of the band"
+                        f"spectra.{name}.cells is {settings.cells}, expected at most the "
+                        f"{subcarriers} of the band"
                     )
-                values = settings.cells * spectrum(name).columns(settings, symbols)
+                values = settings.cells * kind.columns(settings, symbols)
             else:
                 windows(symbols, settings.window, settings.hop, name)
-                values = spectrum(name).rows(settings) * (symbols + stations * settings.window)
+                values = kind.rows(settings) * (symbols + stations * settings.window)
             if values > MOST_VALUES:
                 raise InputError(
-                    f"spectrum {name}: {values} values with its tables, expected at most {MOST_VALUES}"
+                    f"spectrum {name}: {values} values with its tables, expected at most "
+                    f"{MOST_VALUES}"
                 )

@@ -15,10 +15,13 @@ speed at the effective carrier. Both cells are -1 where no symbol was received."
 
 
 class Cube(NamedTuple):
-    """cells: (N, M) complex64, range cells of c / (2 M df) metres, zeros where no symbol was
-    received; chosen: (N,) int64, the cell that the receiver chose, -1 where no symbol was received;
-    truth: (N, 7) float64, columns `TRUTH`;
-    others: the same of each companion in the beam, in the order in which records name them."""
+    """The range cells of all symbols of a sample at one station.
+
+    cells: (N, M) complex64, range cells of c / (2 M df) metres, zeros where no symbol was received;
+    chosen: (N,) int64, the cell that the receiver chose, -1 where no symbol was received; truth:
+    (N, 7) float64, columns `TRUTH`; others: the same of each companion in the beam, in the order in
+    which records name them.
+    """
 
     cells: np.ndarray
     chosen: np.ndarray

@@ -1,5 +1,6 @@
-"""The paper's three spectra by their definitions in float64, batched over signals: for analysis and
-for checks.
+"""The paper's three spectra by their definitions in float64, for analysis and for checks.
+
+They are batched over signals.
 
 Frequencies and speeds ascend along the row axis, time along the last axis. Images reverse the rows
 and use the single-pass kernels of `lowalt.spectra.sliding`, which compute the same values.
@@ -11,8 +12,9 @@ from lowalt.spectra.catalogue import Spectra, spectrum
 
 
 def vrp(signals: np.ndarray, settings: Spectra | None = None) -> np.ndarray:
-    """Return the velocity-resolution-preferred spectrum, (..., symbols) -> (..., 256, 144) by
-    default.
+    """Return the velocity-resolution-preferred spectrum.
+
+    By default (..., symbols) becomes (..., 256, 144).
 
     Raises: InputError where the signal is no longer than the window or is not finite.
     Source: paper, Eq. 28.

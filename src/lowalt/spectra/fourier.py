@@ -1,5 +1,6 @@
-"""Short-time Fourier spectra: the functions that VRP and TRP share, which differ only in their
-settings.
+"""Short-time Fourier spectra: the functions that VRP and TRP share.
+
+They differ only in their settings.
 """
 
 import numpy as np
@@ -15,8 +16,9 @@ ZERO_FIRST = True
 
 
 def segments(signals: np.ndarray, window: int, hop: int, name: str, extra: int = 0) -> np.ndarray:
-    """Return segments of `window + extra` symbols, one per window, complex128: shape (..., windows,
-    window + extra).
+    """Return segments of `window + extra` symbols, one per window, complex128.
+
+    Their shape is (..., windows, window + extra).
 
     Raises: InputError naming the spectrum where the signal is no longer than the window or is not
     finite.
@@ -29,9 +31,8 @@ def segments(signals: np.ndarray, window: int, hop: int, name: str, extra: int =
     if not np.isfinite(signals).all():
         raise InputError(f"spectrum {name}: signals has a NaN or infinite value")
     count = windows(signals.shape[-1], window, hop, name)
-    view = np.lib.stride_tricks.sliding_window_view(
-        signals.astype(np.complex128), window + extra, axis=-1
-    )
+    signals = signals.astype(np.complex128)
+    view = np.lib.stride_tricks.sliding_window_view(signals, window + extra, axis=-1)
     return view[..., : (count - 1) * hop + 1 : hop, :]
 
 
@@ -41,8 +42,7 @@ def rows(settings: Fourier) -> int:
 
 
 def speeds(settings: Fourier, network: Network, station: Station) -> tuple[float, float]:
-    """Return the speeds (m/s, positive recedes) of the first and the last row of `definition`,
-    folded.
+    """Return the folded speeds (m/s, positive recedes) of the first and last row of `definition`.
 
     A positive Doppler frequency approaches, so the speed falls along the rows.
     """
@@ -58,9 +58,8 @@ def magnitudes(signals: np.ndarray, fourier: Fourier, name: str = "stft") -> np.
     Raises: InputError where the signal is no longer than the window or is not finite.
     Source: paper, Eq. 26, 27.
     """
-    spectra = np.fft.fft(
-        segments(signals, fourier.window, fourier.hop, name), fourier.points, axis=-1
-    )
+    cut = segments(signals, fourier.window, fourier.hop, name)
+    spectra = np.fft.fft(cut, fourier.points, axis=-1)
     return np.swapaxes(np.abs(np.fft.fftshift(spectra, axes=-1)), -1, -2)
 
 
@@ -74,15 +73,17 @@ def definition(
 def tables(
     settings: Fourier, frequency_hz: float, symbol_interval_s: float
 ) -> tuple[np.ndarray, ...]:
-    """Return cosines and sines (points,) float32 of the transform; they are the same for every
-    station.
+    """Return cosines and sines (points,) float32 of the transform.
+
+    They are the same for every station.
     """
     return turns(settings.points, np.float32)
 
 
 def fill(re: np.ndarray, im: np.ndarray, settings: Fourier, tables: tuple, out: np.ndarray) -> None:
-    """Fill out (points, starts) float32 with the spectrum of the windows that start at symbols 0 ..
-    starts - 1.
+    """Fill out (points, starts) float32 with the spectrum of windows.
+
+    They start at symbols 0 .. starts - 1.
     """
     fourier_magnitudes(re, im, settings.window, settings.points, *tables, out)
 
@@ -95,8 +96,9 @@ def fill_known(
     symbol_interval_s: float,
     out: np.ndarray,
 ) -> None:
-    """Fill out (points, starts) as `fill`, with the lines that fit a signal (N,) received at
-    `times` (N,) intervals.
+    """Fill out (points, starts) as `fill`, with lines that fit a signal received at known times.
+
+    signal: (N,); times: (N,) in symbol intervals.
     """
     starts = out.shape[1]
     sums = line_sums(signal, times, np.fft.fftfreq(settings.points), settings.window, starts)

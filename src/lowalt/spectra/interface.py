@@ -12,6 +12,9 @@ import numpy as np
 from lowalt.config.network import Network, Station
 from lowalt.spectra.cube import Cube
 
+ZERO_SIGNED = 128
+"""Index that stands for the value zero in the images of a spectrum whose values have a sign."""
+
 
 @runtime_checkable
 class Spectrum(Protocol):
@@ -27,8 +30,9 @@ class Spectrum(Protocol):
     """Whether the rows of `fill` begin at frequency zero (FFT order) or at the most negative value.
     """
     Settings: type
-    """Frozen dataclass of the settings, the keys of the configuration; it has `window` and `hop`,
-    both in symbols.
+    """Frozen dataclass of the settings, the keys of the configuration.
+
+    It has `window` and `hop`, both in symbols.
     """
     DEFAULTS: Any
     """A `Settings`."""
@@ -52,8 +56,9 @@ class Spectrum(Protocol):
         frequency_hz: float,
         symbol_interval_s: float,
     ) -> np.ndarray:
-        """Return the spectrum in float64 by its definition, (..., symbols) -> (..., rows, windows),
-        rows ascending.
+        """Return the spectrum in float64 by its definition, (..., symbols) -> (..., rows, windows).
+
+        Rows ascend.
 
         frequency_hz: f_k of the station; symbol_interval_s: T_r; name: how errors call the
         spectrum.
@@ -63,16 +68,15 @@ class Spectrum(Protocol):
     def tables(
         self, settings: Any, frequency_hz: float, symbol_interval_s: float
     ) -> tuple[np.ndarray, ...]:
-        """Return float32 arrays that `fill` needs and that are the same for all signals of a
-        station.
-        """
+        """Return the float32 arrays that `fill` needs for all signals of a station."""
         ...
 
     def fill(
         self, re: np.ndarray, im: np.ndarray, settings: Any, tables: tuple, out: np.ndarray
     ) -> None:
-        """Fill out (rows, starts) float32 with the windows of one signal (symbols,) that start at 0
-        .. starts - 1.
+        """Fill out (rows, starts) float32 with the windows of one signal (symbols,).
+
+        They start at symbols 0 .. starts - 1.
         """
         ...
 
@@ -92,15 +96,16 @@ class KnowsTimes(Protocol):
         symbol_interval_s: float,
         out: np.ndarray,
     ) -> None:
-        """Fill out as `fill` for a signal (N,), zero where no symbol was received; times: (N,) in
-        symbol intervals.
+        """Fill out as `fill` for a signal (N,), zero where no symbol was received.
+
+        times: (N,) in symbol intervals.
         """
         ...
 
 
 @runtime_checkable
 class OfCells(Protocol):
-    """An image that is made of all range cells, a `Cube`, instead of the signal of the chosen ones."""
+    """An image that is made of all range cells, a `Cube`, instead of the chosen ones' signal."""
 
     TITLE: str
     SOURCE: str

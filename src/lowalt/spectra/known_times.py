@@ -1,5 +1,4 @@
-"""Spectra that use the reception times of symbols: a complex line fitted to each window by least
-squares.
+"""Spectra that use the reception times of symbols: a line fitted to each window by least squares.
 
 At each frequency f, a line a exp(j 2 pi f t) is fitted to the K symbols received in a window, at
 their instants t_k:
@@ -16,15 +15,15 @@ import numpy as np
 
 SOURCE = (
     "N. R. Lomb, Astrophys. Space Sci. 39, 1976; P. Stoica, J. Li, H. He, Spectral analysis of "
-    "nonuniformly sampled "
-    "data: a new approach versus the periodogram, IEEE Trans. Signal Process. 57(3), 2009 (least "
-    "squares of one line)"
+    "nonuniformly sampled data: a new approach versus the periodogram, IEEE Trans. Signal Process. "
+    "57(3), 2009 (least squares of one line)"
 )
 
 
 def received(signal: np.ndarray) -> np.ndarray:
-    """Return which symbols of a signal (N,) were received, (N,) bool: those that are not exactly
-    zero.
+    """Return which symbols of a signal (N,) were received, (N,) bool.
+
+    They are those that are not exactly zero.
     """
     return signal != 0
 
@@ -32,22 +31,23 @@ def received(signal: np.ndarray) -> np.ndarray:
 def line_sums(
     signal: np.ndarray, times: np.ndarray, turns: np.ndarray, window: int, starts: int
 ) -> np.ndarray:
-    """Return sums (R, starts) complex128 over windows of y_k exp(-j 2 pi f t_k), from symbols 0 ..
-    starts - 1 on.
+    """Return sums (R, starts) complex128 over windows of y_k exp(-j 2 pi f t_k).
 
-    signal: (N,), zero where nothing was received; times: (N,) in symbol intervals; turns:
-    frequencies (R,) in turns a symbol interval.
+    The windows start at symbols 0 .. starts - 1. signal: (N,), zero where nothing was received;
+    times: (N,) in symbol intervals; turns: frequencies (R,) in turns a symbol interval.
     """
     at = np.flatnonzero(received(signal))
     steps = np.zeros((len(turns), len(signal) + 1), np.complex128)
-    steps[:, at + 1] = signal[at] * np.exp(-2j * np.pi * np.outer(turns, times[at]))
+    phases = -2j * np.pi * np.outer(turns, times[at])
+    steps[:, at + 1] = signal[at] * np.exp(phases)
     summed = np.cumsum(steps, axis=1)
     return summed[:, window : window + starts] - summed[:, :starts]
 
 
 def shares(signal: np.ndarray, window: int, starts: int) -> np.ndarray:
-    """Return 1 / K (starts,) of the windows that start at symbols 0 .. starts - 1, 0 where nothing
-    was received.
+    """Return 1 / K (starts,) of windows, 0 where nothing was received.
+
+    They start at symbols 0 .. starts - 1.
     """
     count = np.concatenate([[0], np.cumsum(received(signal))])
     found = (count[window : window + starts] - count[:starts]).astype(np.float64)

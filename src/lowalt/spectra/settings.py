@@ -28,8 +28,9 @@ def _power_of_two(where: str, value: object, least: int) -> int:
 
 @dataclass(frozen=True)
 class Fourier:
-    """One short-time Fourier transform: `window` and `hop` in symbols, `points` of the zero-padded
-    FFT.
+    """One short-time Fourier transform.
+
+    window, hop: in symbols; points: of the zero-padded FFT.
     """
 
     window: int
@@ -44,8 +45,9 @@ class Fourier:
 
 @dataclass(frozen=True)
 class Transfer:
-    """The velocity-transfer spectrum: `window` and `hop` in symbols, the grid of matched speeds in
-    m/s.
+    """The velocity-transfer spectrum.
+
+    window, hop: in symbols; the grid of matched speeds is in m/s.
     """
 
     window: int
@@ -58,37 +60,35 @@ class Transfer:
         whole("window", self.window, 1)
         whole("hop", self.hop, 1)
         values = (self.speed_min_mps, self.speed_max_mps, self.speed_step_mps)
-        for name, value in zip(
-            ("speed_min_mps", "speed_max_mps", "speed_step_mps"), values, strict=True
-        ):
-            if (
-                isinstance(value, bool)
-                or not isinstance(value, (int, float))
-                or not np.isfinite(value)
-            ):
+        names = ("speed_min_mps", "speed_max_mps", "speed_step_mps")
+        for name, value in zip(names, values, strict=True):
+            is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
+            if not is_number or not np.isfinite(value):
                 raise InputError(f"{name} is {value!r}, expected a finite speed in m/s")
         if self.speed_step_mps <= 0 or self.speed_max_mps <= self.speed_min_mps:
             raise InputError(f"speeds {values}, expected min < max and a positive step")
         if (self.speed_max_mps - self.speed_min_mps) / self.speed_step_mps >= MOST_SPEEDS:
             raise InputError(
-                f"speeds {values}, min, max and step, expected a step that makes at most {MOST_SPEEDS} of them"
+                f"speeds {values}, min, max and step, expected a step that makes at most "
+                f"{MOST_SPEEDS} of them"
             )
 
     @property
     def speeds_mps(self) -> np.ndarray:
-        """Matched speeds v_min : step : v_max (m/s), shape (speeds,), ascending; positive recedes."""
-        count = (
-            int(np.floor((self.speed_max_mps - self.speed_min_mps) / self.speed_step_mps + 1e-9))
-            + 1
-        )
-        last = self.speed_min_mps + (count - 1) * self.speed_step_mps
-        return np.linspace(self.speed_min_mps, last, count)
+        """Matched speeds v_min : step : v_max (m/s), (speeds,), ascending; positive recedes."""
+        steps = (self.speed_max_mps - self.speed_min_mps) / self.speed_step_mps
+        # A whole number of steps may come out a little too small.
+        whole_steps = int(np.floor(steps + 1e-9))
+        last = self.speed_min_mps + whole_steps * self.speed_step_mps
+        return np.linspace(self.speed_min_mps, last, whole_steps + 1)
 
 
 @dataclass(frozen=True)
 class RangeCells:
-    """A range profile over slow time: `window` and `hop` in symbols, a column averages the powers
-    of a window; `cells` of a profile, odd."""
+    """A range profile over slow time.
+
+    window, hop: in symbols, a column averages the powers of a window; cells: of a profile, odd.
+    """
 
     window: int
     hop: int
@@ -105,8 +105,9 @@ class RangeCells:
 
 @dataclass(frozen=True)
 class Doppler:
-    """A range-Doppler map: `cells` of range, odd, and `points` of the zero-padded FFT over the
-    symbols of a look.
+    """A range-Doppler map.
+
+    cells: of range, odd; points: of the zero-padded FFT over the symbols of a look.
     """
 
     cells: int
@@ -121,8 +122,9 @@ class Doppler:
 
 
 def windows(symbols: int, window: int, hop: int, name: str) -> int:
-    """Return the number of windows, floor((N - L) / hop): one fewer than the usual count, as
-    published.
+    """Return the number of windows, floor((N - L) / hop).
+
+    It is one fewer than the usual count, as published.
 
     Raises: InputError naming the spectrum where the signal is no longer than the window.
     Source: paper, section IV-B (G), and IV-E (G_transfer).
@@ -130,7 +132,7 @@ def windows(symbols: int, window: int, hop: int, name: str) -> int:
     count = (symbols - window) // hop
     if count < 1:
         raise InputError(
-            f"spectrum {name}: a signal of {symbols} symbols with a window of {window} and a hop of {hop} has "
-            f"no window, expected at least {window + hop} symbols"
+            f"spectrum {name}: a signal of {symbols} symbols with a window of {window} and a hop "
+            f"of {hop} has no window, expected at least {window + hop} symbols"
         )
     return count

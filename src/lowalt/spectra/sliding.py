@@ -2,8 +2,8 @@
 
 Overlapping windows share sub-transforms. For a window of L = 2^a symbols, every level of the
 decimation in time needs only one new sub-transform per start,
-    A_0[q, t] = y[t],   A_{s+1}[q, t] = A_s[q, t] + exp(-j 2 pi q d / P) A_s[q, t + d],   d = L /
-    2^(s+1),
+    A_0[q, t] = y[t]
+    A_{s+1}[q, t] = A_s[q, t] + exp(-j 2 pi q d / P) A_s[q, t + d],   d = L / 2^(s+1)
 so a window costs about 2 P butterflies, not P log2 L, and every loop runs over contiguous start
 times. Only additions, products and square roots are used, in a fixed order and never fused: results
 have the same bits on every machine with IEEE 754. The kernels work in the precision of their
@@ -24,8 +24,9 @@ def turns(points: int, dtype: type) -> tuple[np.ndarray, np.ndarray]:
 
 @PLAIN
 def _level(re, im, stride, cosine, sine, out_re, out_im):
-    """One level of decimation in time: out_re and out_im get twice as many sub-spectra, by start
-    time.
+    """One level of decimation in time.
+
+    out_re and out_im get twice as many sub-spectra, by start time.
     """
     single = re.shape[0] == 1
     points = cosine.size
@@ -98,12 +99,11 @@ def fourier_magnitudes(re, im, window, points, cosine, sine, out):
 
 @PLAIN
 def transfer(re, im, window, cosine, sine, share, out):
-    """Fill out (speeds, count) with the velocity-transfer spectrum of windows starting at 0 ..
-    count - 1.
+    """Fill out (speeds, count) with the velocity-transfer spectrum of windows.
 
-    re, im: (symbols,), symbols >= count + window; cosine, sine: (speeds, window + 1) of the
-    conjugate dictionary;
-    share: (1,), (L / (L + 1))^2 in the working precision. Source: paper, Eq. 30 to 35.
+    They start at symbols 0 .. count - 1. re, im: (symbols,), symbols >= count + window; cosine,
+    sine: (speeds, window + 1) of the conjugate dictionary; share: (1,), (L / (L + 1))^2 in the
+    working precision. Source: paper, Eq. 30 to 35.
     """
     speeds, count = out.shape
     x = np.empty(count, re.dtype)

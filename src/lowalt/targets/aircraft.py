@@ -13,6 +13,7 @@ shells.
 import numpy as np
 
 from lowalt.targets.assemble import Part
+from lowalt.targets.record_schema import figures_si
 from lowalt.targets.surfaces import Surface, box, cylinder, ellipsoid, foil, hull, tube
 from lowalt.targets.uav_pieces import blade, fuselage
 
@@ -28,7 +29,7 @@ _LEFT = np.diag([-1.0, 1.0, 1.0])
 
 def fault(record: dict) -> str | None:
     """Return the reason why a merged record is no aircraft of its layout, or None."""
-    f = {name: value["si"] for name, value in record["figures"].items()}
+    f = figures_si(record)
     if "tip_chord" in f and not f["tip_chord"] <= f["root_chord"] < f["body_length"]:
         return (
             f"figures.root_chord is {f['root_chord']:.4g} m, expected from the tip's chord to the "
@@ -61,15 +62,13 @@ def _propeller(
 ) -> Part:
     """A turning propeller of a `size` (diameter m, blade's chord m, blades).
 
-    Its axis is facing @ (0, 0, 1).
-    Rotors share their points by the area of their blades.
+    Its axis is facing @ (0, 0, 1). Rotors share their points by the area of their blades.
     """
     diameter, chord, count = size
-    axis = tuple(float(value) for value in sense * facing[:, 2])
+    x, y, z = (sense * facing[:, 2]).tolist()
     shells = (blade(diameter, chord, sense).mapped(facing).moved(hub),)
-    return Part(
-        name, "rotor", shells, hub, axis, copies=int(count), weight=diameter * chord * count
-    )
+    area = diameter * chord * count
+    return Part(name, "rotor", shells, hub, (x, y, z), copies=int(count), weight=area)
 
 
 def _main_size(f: dict) -> tuple[float, float, float]:
@@ -88,37 +87,38 @@ def _airframe(span: float, f: dict, booms: float = 0.0) -> list[Surface]:
     body = fuselage(f, 0.25).moved((0, middle, -height))
     root = f["root_chord"]
     tip = f["tip_chord"]
-    wing = foil(
-        [
-            (0, 0, 0, root, 0.02),
-            (0.25 * span, 0, 0.01 * span, (root + tip) / 2 + 0.2 * (root - tip), 0.02),
-            (0.5 * span, 0, 0.02 * span, tip, 0.0),
-        ],
-        0.12,
-    )
+    half_way = (root + tip) / 2 + 0.2 * (root - tip)
+    # Position (x, y, z) of the quarter chord, chord, twist.
+    stations = [
+        (0, 0, 0, root, 0.02),
+        (0.25 * span, 0, 0.01 * span, half_way, 0.02),
+        (0.5 * span, 0, 0.02 * span, tip, 0.0),
+    ]
+    wing = foil(stations, 0.12)
     back = nose - f["body_length"] + 0.3 * f["tail_chord"]
     chord = f["tail_chord"]
     thin = 0.09
-    level = -height if not booms else 0.0
-    tail = foil(
-        [(0, back, level, chord, 0), (f["tail_span"] / 2, back, level, 0.7 * chord, 0)], thin
-    )
-    fin = foil(
-        [(0, back, 0, 1.1 * chord, 0), (f["fin_height"], back - 0.2 * chord, 0, 0.6 * chord, 0)],
-        thin,
-    )
-    upright = fin.mapped(_UPRIGHT).moved((booms / 2, 0, level))
-    return [body, *_both(wing), *_both(tail), *(_both(upright) if booms else [upright])]
+    level = 0.0
+    if not booms:
+        level = -height
+    tail_root = (0, back, level, chord, 0)
+    tail_tip = (f["tail_span"] / 2, back, level, 0.7 * chord, 0)
+    tail = foil([tail_root, tail_tip], thin)
+    fin_root = (0, back, 0, 1.1 * chord, 0)
+    fin_tip = (f["fin_height"], back - 0.2 * chord, 0, 0.6 * chord, 0)
+    fin = foil([fin_root, fin_tip], thin)
+    fins = [fin.mapped(_UPRIGHT).moved((booms / 2, 0, level))]
+    if booms:
+        fins = _both(fins[0])
+    return [body, *_both(wing), *_both(tail), *fins]
 
 
 def plane(record: dict, f: dict) -> list[Part]:
     """Return a plane with a tractor propeller at the nose."""
     shells = _airframe(record["published"]["size_m"], f)
-    hub = (
-        0.0,
-        f["wing_station"] * f["body_length"] + 0.02 * f["body_length"],
-        -f["wing_height"] * f["body_height"],
-    )
+    nose = f["wing_station"] * f["body_length"]
+    height = f["wing_height"] * f["body_height"]
+    hub = (0.0, nose + 0.02 * f["body_length"], -height)
     return [
         Part("body", "body", tuple(shells)),
         _propeller("propeller", hub, _main_size(f), _AHEAD),
@@ -142,21 +142,20 @@ def lift_and_cruise(record: dict, f: dict) -> list[Part]:
     lift = f["lift_diameter"]
     chord = 0.08 * f["lift_diameter"]
     lifting = []
-    for sense, place, y in ((1, "front", ahead - 0.02 * reach), (-1, "rear", back + 0.25 * reach)):
+    front_y = ahead - 0.02 * reach
+    rear_y = back + 0.25 * reach
+    for sense, end, y in ((1, "front", front_y), (-1, "rear", rear_y)):
         top = 2.5 * radius
         shells += _both(cylinder(1.5 * radius, (x, y, 0), (x, y, top), 10))
         if turn:
             size = (lift, chord, f["blade_count"])
-            lifting.append(_propeller(f"lift {place} right", (x, y, top), size, _UP, sense))
-            lifting.append(_propeller(f"lift {place} left", (-x, y, top), size, _UP, -sense))
+            lifting.append(_propeller(f"lift {end} right", (x, y, top), size, _UP, sense))
+            lifting.append(_propeller(f"lift {end} left", (-x, y, top), size, _UP, -sense))
         else:
             # A stopped lift propeller is held along its boom, where it resists least.
             shells += _both(box((chord, lift, 0.012 * lift), (x, y, top)))
-    hub = (
-        0.0,
-        back - 0.02 * f["body_length"] + 0.1 * f["tail_chord"],
-        -f["wing_height"] * f["body_height"],
-    )
+    height = f["wing_height"] * f["body_height"]
+    hub = (0.0, back - 0.02 * f["body_length"] + 0.1 * f["tail_chord"], -height)
     return [
         Part("body", "body", tuple(shells)),
         _propeller("propeller", hub, _main_size(f), _AHEAD),
@@ -205,14 +204,16 @@ def helicopter(record: dict, f: dict) -> list[Part]:
     high = f["body_height"]
     chord = 0.45 * f["fin_height"]
     reach = f["tail_span"] / 2
-    shells += _both(foil([(0, end, level, chord, 0), (reach, end, level, chord, 0)], 0.1))
+    tail_plane = foil([(0, end, level, chord, 0), (reach, end, level, chord, 0)], 0.1)
+    shells += _both(tail_plane)
     half_fin = f["fin_height"] / 2
     fin = foil([(-half_fin, end, 0, chord, 0), (half_fin, end, 0, chord, 0)], 0.1)
     shells += _both(fin.mapped(_UPRIGHT).moved((reach, 0, level)))
     foot = f["skid_track"] / 2
     low = -0.5 * high - f["skid_height"]
     thin = 0.03 * half
-    shells += _both(tube([(foot, -0.45 * long, low), (foot, 0.4 * long, low)], 1.5 * thin, 8))
+    skid = [(foot, -0.45 * long, low), (foot, 0.4 * long, low)]
+    shells += _both(tube(skid, 1.5 * thin, 8))
     for y in (-0.25 * long, 0.2 * long):
         shells += _both(tube([(0.4 * half, y, -0.4 * high), (foot, y, low)], thin, 8))
     return [Part("body", "body", tuple(shells)), _main_rotor(record, f)]
@@ -228,7 +229,8 @@ def tail_rotor(record: dict, f: dict) -> list[Part]:
     fin_height = f["fin_height"]
     chord = 0.35 * fin_height
     arm = -f["tail_arm"]
-    plane = foil([(0, arm, level, chord, 0), (f["tail_span"] / 2, arm, level, 0.8 * chord, 0)], 0.1)
+    half_span = f["tail_span"] / 2
+    plane = foil([(0, arm, level, chord, 0), (half_span, arm, level, 0.8 * chord, 0)], 0.1)
     fin = foil(
         [
             (-0.4 * fin_height, end - 0.3 * chord, 0, 0.6 * chord, 0),

@@ -1,11 +1,12 @@
-"""From a model's parts, each a set of closed shells, to a calibration point cloud of an exact count
-of points.
+"""From a model's parts, each a set of closed shells, to a calibration point cloud.
 
-Allotment of points over parts (the rule, also in the cloud's record):
-the moving parts of a model share `moving_share` of the points between them, by their weights, each
-rounded to whole copies (at least one point a copy); the body gets the rest. Parts with several
-copies (the blades of a rotor) are sampled once and turned, so that blades are equal. Echo strength
-goes with the count of points, so the share is also the part of the echo that carries micro-Doppler.
+The cloud has an exact count of points.
+
+Allotment of points over parts (the rule, also in the cloud's record): the moving parts of a model
+share `moving_share` of the points between them, by their weights, each rounded to whole copies (at
+least one point a copy); the body gets the rest. Parts with several copies (the blades of a rotor)
+are sampled once and turned, so that blades are equal. Echo strength goes with the count of points,
+so the share is also that of the echo that carries micro-Doppler.
 """
 
 import json
@@ -19,7 +20,8 @@ from lowalt.targets.cloud import Cloud
 from lowalt.targets.surfaces import Surface, face_normals, inside, merged, sample_faces, thin
 
 CANDIDATES_PER_POINT = 12
-"""Dense samples drawn for each wanted point before the farthest-point thinning."""
+SPARE_CANDIDATES = 200
+"""Dense samples drawn before the farthest-point thinning: for each wanted point, and for a part."""
 
 
 @dataclass(frozen=True)
@@ -49,13 +51,14 @@ def allot(parts: list[Part], count: int, moving_share: float, where: str) -> lis
 
     Raises: InputError naming `where` if `count` leaves the body without a point.
     """
-    weights = np.array([0.0 if part.kind == "body" else part.weight for part in parts])
+    is_body = np.array([part.kind == "body" for part in parts])
+    weights = np.where(is_body, 0.0, [part.weight for part in parts])
     shares = count * moving_share * weights / max(float(portable.total(weights)), 1e-300)
-    counts = [
-        part.copies * max(1, round(share / part.copies))
-        for part, share in zip(parts, shares, strict=True)
-    ]
-    body = next(index for index, part in enumerate(parts) if part.kind == "body")
+    counts = []
+    for part, share in zip(parts, shares, strict=True):
+        in_a_copy = max(1, round(share / part.copies))
+        counts.append(part.copies * in_a_copy)
+    body = int(np.argmax(is_body))
     counts[body] += count - sum(counts)
     if counts[body] < 1:
         raise InputError(
@@ -72,9 +75,8 @@ def _tips(surface: Surface) -> tuple[np.ndarray, np.ndarray]:
     unit, areas = face_normals(surface.vertices, surface.faces)
     points = []
     normals = []
-    for vertex in np.unique(
-        np.concatenate([surface.vertices.argmin(0), surface.vertices.argmax(0)])
-    ):
+    outermost = np.concatenate([surface.vertices.argmin(0), surface.vertices.argmax(0)])
+    for vertex in np.unique(outermost):
         # On a face, not at the vertex: there the normal is that of a surface.
         face = np.argmax(np.where((surface.faces == vertex).any(1), areas, -1.0))
         corner = surface.vertices[vertex]
@@ -92,9 +94,8 @@ def sample_part(part: Part, count: int, rng: np.random.Generator) -> tuple[np.nd
     it.
     """
     whole = merged(part.shells)
-    points, face = sample_faces(
-        whole.vertices, whole.faces, CANDIDATES_PER_POINT * count + 200, rng
-    )
+    candidates = CANDIDATES_PER_POINT * count + SPARE_CANDIDATES
+    points, face = sample_faces(whole.vertices, whole.faces, candidates, rng)
     normals = face_normals(whole.vertices, whole.faces[face])[0]
     tips, facing = _tips(whole)
     if part.kind == "rotor" and count < 2 * len(tips):
@@ -105,7 +106,8 @@ def sample_part(part: Part, count: int, rng: np.random.Generator) -> tuple[np.nd
     normals = np.concatenate([facing, normals])
     # A millionth of the part's size along the normal clears the point's own shell and no other.
     outward = points + 1e-6 * np.ptp(points) * normals
-    seen = ~np.any([inside(shell, outward) for shell in (*part.shells, *part.cuts)], axis=0)
+    hidden = [inside(volume, outward) for volume in (*part.shells, *part.cuts)]
+    seen = ~np.any(hidden, axis=0)
     kept = min(int(seen[: len(tips)].sum()), count)
     points = points[seen]
     normals = normals[seen]
@@ -153,8 +155,9 @@ def cloud_of_parts(
 
 
 def assemble(parts: list[Part], record: dict, rng: np.random.Generator) -> Cloud:
-    """Return the cloud of `parts` with record["points"] points, of which moving parts get
-    record["moving_share"].
+    """Return the cloud of `parts` with record["points"] points.
+
+    Moving parts get record["moving_share"] of them.
 
     Raises: InputError where there are too few points for the parts.
     """
@@ -162,24 +165,15 @@ def assemble(parts: list[Part], record: dict, rng: np.random.Generator) -> Cloud
     samples = []
     for part, count in zip(parts, counts, strict=True):
         points, normals = sample_part(part, count // part.copies, rng)
-        turned = []
+        all_points = []
+        all_normals = []
         for copy in range(part.copies):
-            matrix = (
-                np.eye(3)
-                if copy == 0
-                else turn(np.array(part.axis), 2 * np.pi * copy / part.copies)
-            )
-            centre = np.zeros(3) if copy == 0 else np.array(part.hinge)
-            turned.append(
-                (
-                    portable.applied(matrix, points - centre) + centre,
-                    portable.applied(matrix, normals),
-                )
-            )
-        samples.append(
-            (
-                np.concatenate([points for points, _ in turned]),
-                np.concatenate([normals for _, normals in turned]),
-            )
-        )
+            matrix = np.eye(3)
+            centre = np.zeros(3)
+            if copy > 0:
+                matrix = turn(np.array(part.axis), 2 * np.pi * copy / part.copies)
+                centre = np.array(part.hinge)
+            all_points.append(portable.applied(matrix, points - centre) + centre)
+            all_normals.append(portable.applied(matrix, normals))
+        samples.append((np.concatenate(all_points), np.concatenate(all_normals)))
     return cloud_of_parts(parts, samples, record)

@@ -4,7 +4,7 @@ Axes: front +y, right +x, up +z, metres; the origin lies half-way between bill t
 wings flat. A positive angle about either hinge raises the wing's tip, on both sides. Of the figures
 `length` (bill tip to tail tip) and `span`, those of the living bird, only the ratio is used, since
 the published size sets the length. Ratios are relative to the length, with three exceptions:
-`wing_chord` is relative to half the span, `wrist` is the place of the second hinge along half the
+`wing_chord` is relative to half the span, `wrist` is where the second hinge lies along half the
 span, `tip_chord` is the chord at the tip over that at the root. `fingers` is the number of slotted
 primaries at the tip.
 """
@@ -14,11 +14,14 @@ import math
 import numpy as np
 
 from lowalt.targets.assemble import Part
+from lowalt.targets.record_schema import figures_si
 from lowalt.targets.surfaces import Surface, ellipsoid, foil, hull, loft, superellipse, tube
 
 FLAP = {"mean_deg": 15.0, "amplitude_deg": 40.0, "fold_amplitude_deg": 30.0, "fold_lag_deg": 90.0}
-"""Default wing beat: shoulder mean + amplitude cos(2 pi F t), outer segment fold_amplitude cos(2 pi
-F t - fold_lag).
+"""Default wing beat, of the inner and of the outer segment.
+
+The shoulder turns by mean + amplitude cos(2 pi F t), the outer segment by fold_amplitude cos(2 pi F
+t - fold_lag).
 """
 
 MOVING_SHARE = 0.62
@@ -26,7 +29,7 @@ MOVING_SHARE = 0.62
 
 def fault(record: dict) -> str | None:
     """Return the reason why a merged record is no bird, or None."""
-    f = {name: value["si"] for name, value in record["figures"].items()}
+    f = figures_si(record)
     long = f["bill"] + f["head"] + f["neck"] + f["tail"]
     if long > 0.9:
         return (
@@ -53,7 +56,10 @@ def _bill(front: float, root: float, depth: float) -> Surface:
 def _body(length: float, f: dict) -> tuple[Surface, ...]:
     """Bill, head, neck, trunk and tail fan: bill tip at +length/2, tail tip at -length/2."""
     front = length / 2
-    bill, head, neck, tail = (f[name] * length for name in ("bill", "head", "neck", "tail"))
+    bill = f["bill"] * length
+    head = f["head"] * length
+    neck = f["neck"] * length
+    tail = f["tail"] * length
     half = f["body_width"] * length / 2
     fan_half = f["tail_spread"] * length / 2
     thin = 0.03 * length
@@ -62,9 +68,9 @@ def _body(length: float, f: dict) -> tuple[Surface, ...]:
     shoulder = skull_y - neck - 0.25 * head
     root = -front + tail
     reach = shoulder - root
-    throat = tube(
-        [(0, skull_y, 0), (0, shoulder - 0.12 * reach, 0)], [0.36 * head, 0.6 * half + 0.1 * head]
-    )
+    throat_path = [(0, skull_y, 0), (0, shoulder - 0.12 * reach, 0)]
+    throat = tube(throat_path, [0.36 * head, 0.6 * half + 0.1 * head])
+    # Position from the shoulder to the tail's root, and half width, as shares of both.
     shape = (
         (-0.04, 0.3),
         (0.05, 0.62),
@@ -74,10 +80,11 @@ def _body(length: float, f: dict) -> tuple[Surface, ...]:
         (0.85, 0.55),
         (1.0, 0.3),
     )
-    trunk = hull(
-        [(shoulder - t * reach, w * half, -0.95 * w * half, 0.85 * w * half) for t, w in shape],
-        exponent=2.0,
-    )
+    stations = [
+        (shoulder - t * reach, w * half, -0.95 * w * half, 0.85 * w * half) for t, w in shape
+    ]
+    trunk = hull(stations, exponent=2.0)
+    # Position, half width, and half thickness in units of `thin`.
     feathers = (
         (root + 0.3 * tail, 0.28 * half, 1.0),
         (root - 0.3 * tail, 0.5 * fan_half, 0.4),
@@ -85,13 +92,8 @@ def _body(length: float, f: dict) -> tuple[Surface, ...]:
         (-front, 0.86 * fan_half, 0.1),
     )
     fan = hull([(y, w, -h * thin, h * thin) for y, w, h in feathers], exponent=3.0)
-    return (
-        _bill(front, front - bill - 0.2 * head, f["bill_depth"] * length),
-        skull,
-        throat,
-        trunk,
-        fan,
-    )
+    hooked = _bill(front, front - bill - 0.2 * head, f["bill_depth"] * length)
+    return hooked, skull, throat, trunk, fan
 
 
 def _inner(shoulder: np.ndarray, wrist: np.ndarray, chord: float) -> Surface:
@@ -103,45 +105,36 @@ def _inner(shoulder: np.ndarray, wrist: np.ndarray, chord: float) -> Surface:
 
 
 def _outer(wrist: np.ndarray, half_span: float, chord: float, f: dict) -> tuple[Surface, ...]:
-    """The outer segment of the right wing: pointed, or blunt with slotted primaries spread like
-    fingers.
+    """The outer segment of the right wing.
+
+    It is pointed, or blunt with slotted primaries spread like fingers.
     """
     x, y, z = wrist
     reach = half_span - x
     back = 0.2 * chord
     fingers = int(f["fingers"])
     tip = f["tip_chord"] * chord
-    plan = (
-        [(0, 0.95), (0.35, 0.87), (0.62, 0.76)]
-        if fingers
-        else [(0, 0.95), (0.35, 0.81), (0.7, 0.57), (0.92, 0.28)]
-    )
-    rows = [
-        (x + t * reach, y - back * t * math.sqrt(t), z, max(c * chord, c * tip), 0.03)
-        for t, c in plan
-    ]
+    # Position from the wrist to the tip, and chord over that at the root.
+    plan = [(0, 0.95), (0.35, 0.81), (0.7, 0.57), (0.92, 0.28)]
+    if fingers:
+        plan = [(0, 0.95), (0.35, 0.87), (0.62, 0.76)]
+    rows = []
+    for t, c in plan:
+        row_y = y - back * t * math.sqrt(t)
+        rows.append((x + t * reach, row_y, z, max(c * chord, c * tip), 0.03))
     if not fingers:
-        return (
-            foil([*rows, (half_span, y - 1.1 * back, z, min(0.5 * tip, 0.25 * chord), 0.03)], 0.06),
-        )
+        pointed_end = (half_span, y - 1.1 * back, z, min(0.5 * tip, 0.25 * chord), 0.03)
+        return (foil([*rows, pointed_end], 0.06),)
     shells = [foil(rows, 0.06)]
     edge = rows[-1][1]
     width = 0.9 * chord / fingers
     for spread in np.linspace(0, 1, fingers):
-        start = np.array([x + 0.52 * reach, edge + (0.12 - 0.55 * spread) * chord, z])
-        end = np.array(
-            [half_span - 0.095 * spread * reach, start[1] + (0.12 - 0.55 * spread) * tip, z]
-        )
-        shells.append(
-            foil(
-                [
-                    (*start, width, 0.02),
-                    (*(start + end) / 2, width, 0.02),
-                    (*end, 0.4 * width, 0.02),
-                ],
-                0.06,
-            )
-        )
+        aside = 0.12 - 0.55 * spread
+        start = np.array([x + 0.52 * reach, edge + aside * chord, z])
+        end = np.array([half_span - 0.095 * spread * reach, start[1] + aside * tip, z])
+        middle = (start + end) / 2
+        primary = [(*start, width, 0.02), (*middle, width, 0.02), (*end, 0.4 * width, 0.02)]
+        shells.append(foil(primary, 0.06))
     return tuple(shells)
 
 
@@ -150,7 +143,7 @@ def parts(record: dict) -> tuple[list[Part], dict]:
 
     The facts, `flap` and `wing_span_m`, are for the cloud's record.
     """
-    f = {name: value["si"] for name, value in record["figures"].items()}
+    f = figures_si(record)
     length = record["published"]["size_m"]
     half_span = length * f["span"] / f["length"] / 2
     body_half = f["body_width"] * length / 2

@@ -1,5 +1,6 @@
-"""Built-in models: the check of a record's figures with their units and sources, and the step to
-its cloud.
+"""Built-in models: the check of a record's figures with their units and sources.
+
+The module also makes a record's cloud.
 """
 
 import hashlib

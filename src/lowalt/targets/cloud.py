@@ -1,5 +1,6 @@
-"""The calibration point cloud (CPC): the one file that passes from targets to motion, and what it
-must hold.
+"""The calibration point cloud (CPC): the one file that passes from targets to motion.
+
+The module says what it must hold.
 
 A cloud is a NumPy archive (.npz): it keeps float64 exactly, holds several arrays of different shape
 in one file, and NumPy, MATLAB (scipy.io) and Julia open it without our code. Frame: metres,
@@ -12,11 +13,14 @@ body-centred, front +y, up +z. Every point belongs to one part; every part excep
     kinds       (P,)    str      body | rotor | wing | wheel | node
     names       (P,)    str      one name a part, unique in the cloud
     parents     (P,)    int64    the part that this part's hinge moves with (an outer wing: its
-    inner wing), -1 for none hinges      (P, 3)  float64  m, a point on the part's axis (NaN for
-    body and node) axes        (P, 3)  float64  unit vector of the axis; its sign is a rotor's sense
-    (NaN for body and node) track       (F, L, 3) float64 m, a cyclic recording of all points (F = 0
-    unless the parts are nodes) record      str     JSON: subtype, category, source, checksum,
-    track_rate_hz, rate_factors, sizes, ...
+                                 inner wing), -1 for none
+    hinges      (P, 3)  float64  m, a point on the part's axis (NaN for body and node)
+    axes        (P, 3)  float64  unit vector of the axis; its sign is a rotor's sense (NaN for body
+                                 and node)
+    track       (F, L, 3) float64  m, a cyclic recording of all points (F = 0 unless the parts are
+                                 nodes)
+    record      str     JSON: subtype, category, source, checksum, track_rate_hz, rate_factors,
+                        sizes, ...
 """
 
 import json
@@ -36,15 +40,17 @@ from lowalt.files.json_objects import json_object
 
 KINDS = ("body", "rotor", "wing", "wheel", "node")
 MOST_TURNING_PARTS = 16
-"""Most rotors or wheels of a cloud, each with a phase of its own (EH216-S flown as coaxial pairs
-has 16 rotors).
+"""Most rotors or wheels of a cloud, each with a phase of its own.
+
+EH216-S, flown as coaxial pairs, has 16 rotors.
 """
 
 LARGEST_RATE_FACTOR = 100
 LARGEST_M = 1e3
 LARGEST_RCS_M2 = 1e9
-"""Bounds of coordinates and cross sections: far more than any target has, and far less than what
-overflows.
+"""Bounds of coordinates and cross sections.
+
+They are far more than any target has, and far less than what overflows.
 """
 
 
@@ -81,8 +87,9 @@ class Cloud:
 
     @property
     def rate_factors(self) -> np.ndarray:
-        """Rate of each part (P,) divided by the rate of its motion model; 1 unless the record
-        states it.
+        """Rate of each part (P,) divided by the rate of its motion model.
+
+        It is 1 unless the record states it.
         """
         factors = self.record.get("rate_factors", {})
         return np.array([float(factors.get(name, 1.0)) for name in self.names])
@@ -104,14 +111,15 @@ def check(cloud: Cloud, where: str) -> Cloud:
     return cloud
 
 
-def _near(places: np.ndarray) -> bool:
+def _near(positions: np.ndarray) -> bool:
     """Return whether all coordinates are numbers within LARGEST_M."""
-    return bool((abs(places) <= LARGEST_M).all())
+    return bool((abs(positions) <= LARGEST_M).all())
 
 
 def _arrays(cloud: Cloud) -> Iterator[tuple[bool, str]]:
-    """Return whether each array has its shape and numbers in range, and otherwise the fault in
-    words.
+    """Return whether each array has its shape and numbers in range.
+
+    The text of each pair states the fault.
     """
     count = len(cloud.points)
     parts = len(cloud.kinds)
@@ -127,7 +135,9 @@ def _arrays(cloud: Cloud) -> Iterator[tuple[bool, str]]:
     }
     for name, shape in shapes.items():
         array = getattr(cloud, name)
-        numbers = "iu" if name in ("part", "parents") else "iuf"
+        numbers = "iuf"
+        if name in ("part", "parents"):
+            numbers = "iu"
         yield np.shape(array) == shape, f"{name} has shape {np.shape(array)}, expected {shape}"
         yield (
             array.dtype.kind in numbers,
@@ -135,15 +145,19 @@ def _arrays(cloud: Cloud) -> Iterator[tuple[bool, str]]:
         )
     yield _near(cloud.points), f"points has a coordinate that is no number within {LARGEST_M:g} m"
     good_rcs = (cloud.rcs_m2 >= 0) & (cloud.rcs_m2 <= LARGEST_RCS_M2)
-    yield good_rcs.all(), f"rcs_m2 has a value that is no number from 0 to {LARGEST_RCS_M2:g} m2"
+    yield (
+        bool(good_rcs.all()),
+        f"rcs_m2 has a value that is no number from 0 to {LARGEST_RCS_M2:g} m2",
+    )
     lengths = np.linalg.norm(cloud.normals, axis=1)
     good_normals = np.isnan(lengths) | (abs(lengths - 1) < 1e-9)
-    yield good_normals.all(), "normals has a vector of length other than 1 or NaN"
+    yield bool(good_normals.all()), "normals has a vector of length other than 1 or NaN"
 
 
 def _parts(cloud: Cloud) -> Iterator[tuple[bool, str]]:
-    """Return whether name, kind, parent, hinge and axis of each part are right, and otherwise the
-    fault in words.
+    """Return whether name, kind, parent, hinge and axis of each part are right.
+
+    The text of each pair states the fault.
     """
     count = len(cloud.kinds)
     unique = len(set(cloud.names)) == count == len(cloud.names)
@@ -153,13 +167,15 @@ def _parts(cloud: Cloud) -> Iterator[tuple[bool, str]]:
         cloud.part.min() >= 0 and cloud.part.max() < count,
         f"part names a part outside 0..{count - 1}",
     )
-    for index, (kind, name, parent) in enumerate(
-        zip(cloud.kinds, cloud.names, cloud.parents, strict=True)
-    ):
+    parts = zip(cloud.kinds, cloud.names, cloud.parents, strict=True)
+    for index, (kind, name, parent) in enumerate(parts):
         yield -1 <= parent < index, f"parents[{index}] is {parent}, expected an earlier part or -1"
         if kind in ("rotor", "wing", "wheel"):
             length = np.linalg.norm(cloud.axes[index])
-            yield abs(length - 1) < 1e-12, f"axes[{index}] ({name}) has length {length}, expected 1"
+            yield (
+                bool(abs(length - 1) < 1e-12),
+                f"axes[{index}] ({name}) has length {length}, expected 1",
+            )
             yield (
                 _near(cloud.hinges[index]),
                 f"hinges[{index}] ({name}) is no place within {LARGEST_M:g} m",
@@ -167,22 +183,21 @@ def _parts(cloud: Cloud) -> Iterator[tuple[bool, str]]:
 
 
 def _facts(cloud: Cloud) -> Iterator[tuple[bool, str]]:
-    """Return whether the record has all required keys and a track fits its nodes, and otherwise the
-    fault in words.
+    """Return whether the record has all required keys and a track fits its nodes.
+
+    The text of each pair states the fault.
     """
     missing = {"subtype", "category", "source", "checksum"} - set(cloud.record)
     yield not missing, f"record lacks {sorted(missing)}"
+    classes.refuse_subtype(cloud.record["subtype"], "record")
     classes.like(cloud.record)
     factors = cloud.record.get("rate_factors", {})
     yield (
         isinstance(factors, dict),
         f"rate_factors: {factors!r}, expected numbers by the parts' names",
     )
-    turning = [
-        name
-        for name, kind in zip(cloud.names, cloud.kinds, strict=True)
-        if kind in ("rotor", "wheel")
-    ]
+    turning_parts = sorted([*cloud.parts_of("rotor"), *cloud.parts_of("wheel")])
+    turning = [cloud.names[part] for part in turning_parts]
     strange = sorted(set(factors) - set(turning))
     yield not strange, f"rate_factors: {strange} are no parts that turn, expected some of {turning}"
     good = all(
@@ -208,8 +223,10 @@ def _facts(cloud: Cloud) -> Iterator[tuple[bool, str]]:
 
 def extent(cloud: Cloud) -> float:
     """Return the longest side (m) of the box around a cloud's points in all frames."""
-    places = cloud.track.reshape(-1, 3) if len(cloud.track) else cloud.points
-    return float((places.max(axis=0) - places.min(axis=0)).max())
+    positions = cloud.points
+    if len(cloud.track):
+        positions = cloud.track.reshape(-1, 3)
+    return float((positions.max(axis=0) - positions.min(axis=0)).max())
 
 
 def scaled(cloud: Cloud, factor: float) -> Cloud:
@@ -223,8 +240,9 @@ def scaled(cloud: Cloud, factor: float) -> Cloud:
 
 
 def cloud_of(clouds: Mapping[str, Cloud], row: dict) -> Cloud:
-    """Return the cloud of a motion table's row among `clouds`, by subtype, at the row's own size
-    where it has one.
+    """Return the cloud of a motion table's row among `clouds`, by subtype.
+
+    It has the row's own size where the row states one.
 
     Raises: InputError naming the sample where there is none.
     """
@@ -234,7 +252,9 @@ def cloud_of(clouds: Mapping[str, Cloud], row: dict) -> Cloud:
             f"{sorted(clouds)}"
         )
     cloud = clouds[row["subtype"]]
-    return scaled(cloud, row["scale"]) if "scale" in row else cloud
+    if "scale" in row:
+        return scaled(cloud, row["scale"])
+    return cloud
 
 
 def write(path: str | Path, cloud: Cloud) -> None:
@@ -243,23 +263,21 @@ def write(path: str | Path, cloud: Cloud) -> None:
     Raises: InputError where the cloud breaks the contract.
     """
     check(cloud, str(path))
+    arrays = {
+        "points": cloud.points,
+        "normals": cloud.normals,
+        "rcs_m2": cloud.rcs_m2,
+        "part": cloud.part.astype(np.int64),
+        "kinds": np.array(cloud.kinds),
+        "names": np.array(cloud.names),
+        "parents": cloud.parents.astype(np.int64),
+        "hinges": cloud.hinges,
+        "axes": cloud.axes,
+        "track": cloud.track,
+        "record": np.array(json.dumps(cloud.record, sort_keys=True)),
+    }
     with replacing(path) as temporary:
-        write_arrays(
-            temporary,
-            dict(
-                points=cloud.points,
-                normals=cloud.normals,
-                rcs_m2=cloud.rcs_m2,
-                part=cloud.part.astype(np.int64),
-                kinds=np.array(cloud.kinds),
-                names=np.array(cloud.names),
-                parents=cloud.parents.astype(np.int64),
-                hinges=cloud.hinges,
-                axes=cloud.axes,
-                track=cloud.track,
-                record=np.array(json.dumps(cloud.record, sort_keys=True)),
-            ),
-        )
+        write_arrays(temporary, arrays)
 
 
 def read(path: str | Path) -> Cloud:
@@ -272,7 +290,8 @@ def read(path: str | Path) -> Cloud:
         with np.load(path, allow_pickle=False) as data:
             arrays = {name: data[name] for name in data.files}
         record = json_object(str(arrays.pop("record")), path, "a cloud")
-        kinds, names = (tuple(map(str, arrays.pop(name))) for name in ("kinds", "names"))
+        kinds = tuple(map(str, arrays.pop("kinds")))
+        names = tuple(map(str, arrays.pop("names")))
         cloud = Cloud(kinds=kinds, names=names, record=record, **arrays)
     except UNREADABLE as error:
         raise InputError(f"{path}: not a cloud file ({error})") from error

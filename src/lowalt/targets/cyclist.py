@@ -14,8 +14,9 @@ WHEEL_M = 0.678
 CRANK_M = 0.170
 WHEEL_BASE_M = 1.02
 GEAR = 3
-"""Turns of the wheels for each turn of the cranks; a whole number closes the cycle. 1.0 turn/s is
-then 6.4 m/s.
+"""Turns of the wheels for each turn of the cranks.
+
+A whole number closes the cycle. 1.0 turn/s is then 6.4 m/s.
 """
 RIM = 8
 """Points on each rim."""
@@ -42,8 +43,7 @@ _BRACKET = np.array([0.0, -0.04, 0.27])
 
 
 def cycle_m(stature_m: float, frames: int) -> tuple[np.ndarray, tuple[str, ...], float]:
-    """Return one turn of the cranks (frames, nodes, 3) in metres, the nodes' names, and the
-    distance it covers (m).
+    """Return one turn of the cranks (frames, nodes, 3) m, the nodes' names, and its distance (m).
 
     The origin lies in the middle of the wheel base on the ground.
     Raises: InputError where the rider's legs do not reach the pedals.
@@ -87,5 +87,5 @@ def cycle_m(stature_m: float, frames: int) -> tuple[np.ndarray, tuple[str, ...],
         nodes[f"{name} hub"] = hub
         for point in range(RIM):
             nodes[f"{name} rim {point + 1}"] = hub + circle(GEAR * phase + point / RIM, WHEEL_M / 2)
-    track = np.stack([still + place for place in nodes.values()], 1)
+    track = np.stack([still + position for position in nodes.values()], 1)
     return track, tuple(nodes), GEAR * np.pi * WHEEL_M

@@ -1,5 +1,6 @@
-"""The CMU recordings that `config/targets/real.yaml` and the tests use, from their official
-addresses.
+"""Downloads the CMU recordings that `config/targets/real.yaml` and the tests use.
+
+They come from their official addresses.
 
 "The data used in this project was obtained from mocap.cs.cmu.edu. The database was created with
 funding from NSF EIA-0196217." It is free for use in research and products, but must not be resold,
@@ -22,21 +23,25 @@ SHA256 = load_yaml(Path(__file__).with_name("cmu_recordings.yaml"))
 """Checksum of each file by subject and name."""
 
 PINNED_BYTES = {"07/07_12.amc": 187_672}
-"""Number of bytes that are pinned of a file: the known copy of 07_12.amc ends within its last
-frame, frame 245.
+"""Number of bytes that are pinned of a file.
+
+The known copy of 07_12.amc ends within its last frame, frame 245.
 """
 
 
 def checksum(name: str, path: Path) -> str:
-    """Return the SHA-256 (64 hexadecimal digits) of a recording's file as it is pinned: line ends
-    as LF, and only the bytes that are pinned."""
+    """Return the SHA-256 (64 hexadecimal digits) of a recording's file.
+
+    It is that of the file as it is pinned: line ends as LF, and only the bytes that are pinned.
+    """
     content = path.read_bytes().replace(b"\r\n", b"\n")
     return hashlib.sha256(content[: PINNED_BYTES.get(name)]).hexdigest()
 
 
 def fetch(name: str, folder: Path, base: str = OFFICIAL) -> bool:
-    """Put the file `name` (SS/SS.asf or SS/SS_TT.amc) into `folder`/cmu; return False where it
-    already was there.
+    """Put the file `name` into `folder`/cmu; return False where it already was there.
+
+    name: SS/SS.asf or SS/SS_TT.amc.
 
     Nothing is kept unless its SHA-256 is the pinned one.
     Raises: InputError naming the address for an unknown name, a failed download or a wrong

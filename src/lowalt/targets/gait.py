@@ -1,5 +1,6 @@
-"""The built-in pedestrian: a parametric walk or run that drives the 31 nodes, where no recording is
-given.
+"""The built-in pedestrian: a parametric walk or run that drives the 31 nodes.
+
+It stands in where no recording is given.
 
 The modules `cyclist` and `quadruped` make a cyclist and a dog in the same way, from nodes of their
 own. This module holds the human body: the lengths of its segments, the rotations of its bones by
@@ -9,6 +10,7 @@ root's mean position is the origin.
 
 import hashlib
 import json
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -21,8 +23,9 @@ from lowalt.targets.cloud import Cloud
 from lowalt.targets.skeleton import FEET, NODES, forward_kinematics, node_cloud, rotation
 
 HIP_HEIGHT = 0.530
-"""Hip (greater trochanter) above ground, in statures. Source: Drillis and Contini 1966, in Winter's
-handbook.
+"""Hip (greater trochanter) above ground, in statures.
+
+Source: Drillis and Contini 1966, in Winter's handbook.
 """
 
 # Segment lengths are Winter's. The division of spine, neck, hand and foot among CMU's bones is an
@@ -67,13 +70,16 @@ def bones_m(stature_m: float) -> np.ndarray:
         if name in _MIDDLE:
             result[index] = _MIDDLE[name]
         else:
-            result[index] = np.array(_RIGHT[name[1:]]) * ([-1, 1, 1] if name[0] == "l" else 1)
+            result[index] = _RIGHT[name[1:]]
+            if name[0] == "l":
+                result[index] *= [-1, 1, 1]
     return result * stature_m
 
 
 def _toe_pitch(foot_rad: np.ndarray) -> np.ndarray:
-    """The toes' pitch (rad): that of the foot while it points up, about a third of it where the
-    heel is lifted.
+    """The toes' pitch (rad).
+
+    It is that of the foot while the foot points up, about a third of it where the heel is lifted.
     """
     # The ball of the foot bends at push-off, else the toes would enter the ground. A smooth
     # estimate.
@@ -83,16 +89,18 @@ def _toe_pitch(foot_rad: np.ndarray) -> np.ndarray:
 
 
 def _rotations(phase: np.ndarray, leg, arm, trunk: dict[str, np.ndarray]) -> np.ndarray:
-    """Return every bone's global rotation (F, 31, 3, 3); `leg(phase)` and `arm(phase)` give the
-    right side's.
+    """Return every bone's global rotation (F, 31, 3, 3).
+
+    leg, arm: functions of the phase that give the right side's angles.
     """
     pelvis = product(rotation("z", trunk["turn"]), rotation("y", trunk["list"]))
     chest = product(rotation("z", trunk["twist"]), rotation("x", -trunk["lean"]))
     turned = {"root": pelvis}
     for name, share in _TRUNK_SHARE.items():
-        below = (
-            1 - share if name in ("lowerback", "upperback") else 0
-        )  # along the neck, the yaw falls to zero
+        # Along the neck, the yaw falls to zero.
+        below = 0.0
+        if name in ("lowerback", "upperback"):
+            below = 1 - share
         yaw = share * trunk["twist"] + below * trunk["turn"]
         turned[name] = product(rotation("z", yaw), rotation("x", -share * trunk["lean"]))
         turned[name] = product(turned[name], rotation("y", below * trunk["list"]))
@@ -153,7 +161,7 @@ def stance_speed_mps(
     rate_hz: float,
     speed_mps: float,
     height_m: float = 0.02,
-    feet: list[int] = FEET,
+    feet: Sequence[int] = FEET,
 ) -> float:
     """Return the mean ground speed (m/s) of the lowest foot node while it carries the body.
 
@@ -161,20 +169,22 @@ def stance_speed_mps(
     `feet` the numbers of the foot nodes, front +y, horizontal progress left out; `speed_mps` is
     added back. A foot that stands still has the speed zero. The ground is the feet's lowest point.
     """
-    places = cycle[:, feet]
-    velocity = (np.roll(places, -1, axis=0) - np.roll(places, 1, axis=0)) * rate_hz / 2
+    positions = cycle[:, feet]
+    after = np.roll(positions, -1, axis=0)
+    before = np.roll(positions, 1, axis=0)
+    velocity = (after - before) * rate_hz / 2
     velocity[..., 1] += speed_mps
-    lowest = places[..., 2].argmin(axis=1)
-    frames = np.arange(len(places))
-    down = places[frames, lowest, 2] < places[..., 2].min() + height_m
-    return float(portable.mean(portable.norm(velocity[frames, lowest, :2])[down]))
+    height = positions[..., 2]
+    lowest = height.argmin(axis=1)
+    frames = np.arange(len(positions))
+    down = height[frames, lowest] < height.min() + height_m
+    speeds = portable.norm(velocity[frames, lowest, :2])
+    return float(portable.mean(speeds[down]))
 
 
 def _cycle(record: dict, frames: int) -> tuple[np.ndarray, tuple[str, ...], float, float]:
-    """One cycle (frames, L, 3) in metres, the nodes' names, its duration (s) and the distance it
-    covers (m).
-    """
-    kind = record.get("gait")
+    """One cycle (frames, L, 3) m, the nodes' names, its duration (s) and its distance (m)."""
+    kind = record["gait"]
     stature = record["stature_m"]
     speed = record["speed_mps"]
     if kind not in ("cycle", "trot"):
@@ -248,7 +258,7 @@ def gait_cloud(record: dict, seed: int) -> Cloud:
     if record["gait"] == "cycle":
         facts["cadence"] = "tied"  # wheels turn with the speed whatever `motion.cadence` is
     else:
-        feet = FEET
+        feet: Sequence[int] = FEET
         if names != NODES:
             feet = [number for number, name in enumerate(names) if name.endswith("paw")]
         facts["stance_foot_speed_mps"] = stance_speed_mps(track, rate, speed, feet=feet)

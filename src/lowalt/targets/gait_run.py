@@ -44,7 +44,10 @@ BOB_M = 0.035
 
 def leg(phase: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return flexion (rad) of hip, knee and ankle of the right leg, each shaped like `phase`."""
-    return tuple(np.radians(through(list(points), phase)) for points in (HIP, KNEE, ANKLE))
+    hip = np.radians(through(list(HIP), phase))
+    knee = np.radians(through(list(KNEE), phase))
+    ankle = np.radians(through(list(ANKLE), phase))
+    return hip, knee, ankle
 
 
 def arm(phase: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -55,8 +58,9 @@ def arm(phase: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def trunk(phase: np.ndarray) -> dict[str, np.ndarray]:
-    """Return the trunk's rotations (rad) by name, as `gait_walk.trunk` does; each shaped like
-    `phase`.
+    """Return the trunk's rotations (rad) by name, as `gait_walk.trunk` does.
+
+    Each is shaped like `phase`.
     """
     swing = sine_cosine_turns(phase)[1]
     angles = {
@@ -69,8 +73,9 @@ def trunk(phase: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def shift_m(phase: np.ndarray) -> np.ndarray:
-    """Return the root's periodic translation (..., 3) in metres: lowest in each mid-stance, highest
-    in flight.
+    """Return the root's periodic translation (..., 3) in metres.
+
+    It is lowest in each mid-stance, highest in flight.
     """
     up = -BOB_M * sine_cosine_turns(2 * np.asarray(phase) - SUPPORT)[1]
     return np.stack([np.zeros_like(up), np.zeros_like(up), up], axis=-1)

@@ -11,10 +11,14 @@ import numpy as np
 from lowalt.files.errors import InputError
 from lowalt.numerics.portable import sine_cosine_turns
 
+SLOW = 0.5
+"""Relative speed up to which most amplitudes grow."""
+
 
 def through(points: list[tuple[float, float]], phase: np.ndarray) -> np.ndarray:
-    """Return a periodic, continuously differentiable curve through (phase, value) control points,
-    at `phase`.
+    """Return a periodic, continuously differentiable curve through control points, at `phase`.
+
+    points: (phase, value) of each.
 
     The curve is monotone between control points (Fritsch and Carlson 1980), so it does not
     overshoot. `phase` may have any values.
@@ -31,9 +35,8 @@ def through(points: list[tuple[float, float]], phase: np.ndarray) -> np.ndarray:
     safe = np.where(same, steep * earlier, 1.0)
     first = 2 * width + before
     second = width + 2 * before
-    slope = np.where(
-        same, (first + second) * safe / (first * np.where(same, steep, 1.0) + second * earlier), 0.0
-    )
+    weighted = first * np.where(same, steep, 1.0) + second * earlier
+    slope = np.where(same, (first + second) * safe / weighted, 0.0)
     left = np.searchsorted(times, phase, side="right") - 1
     along = np.where(left < 0, phase + 1, phase) - times[left]
     near = slope[left]
@@ -46,8 +49,7 @@ def through(points: list[tuple[float, float]], phase: np.ndarray) -> np.ndarray:
 
 
 def timing(rv: float) -> tuple[float, float, float]:
-    """Return (cycle length / hip height, cycle duration in s, share of support in the cycle) at
-    relative speed rv.
+    """Return (cycle length / hip height, duration in s, share of support) at relative speed rv.
 
     Raises: InputError where rv is outside the model's 0 < rv <= 3.
     """
@@ -58,7 +60,8 @@ def timing(rv: float) -> tuple[float, float, float]:
         )
     length = 1.346 * np.sqrt(rv)
     duration = length / rv
-    return float(length), float(duration), float((0.752 * duration - 0.143) / duration)
+    support = (0.752 * duration - 0.143) / duration
+    return float(length), float(duration), float(support)
 
 
 def leg(rv: float, phase: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -86,7 +89,11 @@ def leg(rv: float, phase: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarra
         (support, -3 - 17 * slow - 8 * fast),
         (0.85, -3 + 5 * fast),
     ]
-    return tuple(np.radians(through(points, phase)) for points in (hip, knee, ankle))
+    return (
+        np.radians(through(hip, phase)),
+        np.radians(through(knee, phase)),
+        np.radians(through(ankle, phase)),
+    )
 
 
 def arm(rv: float, phase: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -124,16 +131,16 @@ def trunk(rv: float, phase: np.ndarray) -> dict[str, np.ndarray]:
         ],
         drop + drop * sine_cosine_turns((phase - 0.65) * 10 / 7)[1],
     )
-    tilt = -8 * rv * rv + 8 * rv if rv < 0.5 else 2.0
+    tilt = 2.0
+    if rv < SLOW:
+        tilt = -8 * rv * rv + 8 * rv
     lean = tilt - tilt * sine_cosine_turns(2 * phase - 0.1)[0]
-    twist = through(
-        [(0.1, -4 / 3 * rv), (0.4, 1.5 * rv), (0.6, 4 / 3 * rv), (0.9, -1.5 * rv)], phase
-    )
+    twist = [(0.1, -4 / 3 * rv), (0.4, 1.5 * rv), (0.6, 4 / 3 * rv), (0.9, -1.5 * rv)]
     angles = {
         "list": sway,
         "turn": 4 * rv * sine_cosine_turns(phase)[1],
         "lean": lean,
-        "twist": twist,
+        "twist": through(twist, phase),
     }
     return {name: np.radians(value) for name, value in angles.items()}
 
@@ -145,8 +152,11 @@ def shift(rv: float, phase: np.ndarray) -> np.ndarray:
     support.
     """
     _, _, support = timing(rv)
-    side = 0.128 * rv * (1 - rv) if rv < 0.5 else 0.032
-    along = -0.084 * rv * (1 - rv) if rv < 0.5 else -0.021
+    side = 0.032
+    along = -0.021
+    if rv < SLOW:
+        side = 0.128 * rv * (1 - rv)
+        along = -0.084 * rv * (1 - rv)
     phase = np.asarray(phase)
     up = 0.015 * rv
     return np.stack(

@@ -21,8 +21,9 @@ DIRECTIONS = {
     "Vehicle": (90.0, 7.0),
     "Pedestrian": (75.0, 8.0),
 }
-"""The viewer's azimuth, from the front towards the right, and elevation (degrees), chosen for each
-category.
+"""The viewer's azimuth, from the front towards the right, and elevation (degrees).
+
+They are chosen for each category.
 """
 
 BODY_COLOUR = "#52525b"
@@ -58,8 +59,9 @@ def axes_of(kind: str) -> np.ndarray:
 
 
 def shown(cloud: Cloud) -> np.ndarray:
-    """Return the points (L, 3) as (right, up, toward the viewer) in m: those of a recording in its
-    first frame.
+    """Return the points (L, 3) as (right, up, toward the viewer) in m.
+
+    Those of a recording are in its first frame.
     """
     points = cloud.track[0] if len(cloud.track) else cloud.points
     seen = points @ axes_of(cloud.like).T
@@ -67,8 +69,9 @@ def shown(cloud: Cloud) -> np.ndarray:
 
 
 def colours(cloud: Cloud) -> np.ndarray:
-    """Return the RGBA colour of each point (L, 4): grey for the body, one of PART_COLOURS for each
-    other part.
+    """Return the RGBA colour of each point (L, 4).
+
+    It is grey for the body, one of PART_COLOURS for each other part.
 
     Points that face away from the viewer are faint.
     """

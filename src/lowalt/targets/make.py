@@ -7,14 +7,16 @@ from lowalt.files.errors import InputError
 from lowalt.targets.cloud import Cloud, check
 
 SOURCES = ("builtin", "mesh", "mocap", "gait")
-"""The sources of clouds. The module of a source defines `check_record(merged, where)` and
-`SOURCE_cloud`.
+"""The sources of clouds.
+
+The module of a source defines `check_record(merged, where)` and `SOURCE_cloud`.
 """
 
 
 def source_module(source: str) -> ModuleType:
-    """Return the module of one of SOURCES, imported at the call: a built-in cloud waits for no
-    reader of files.
+    """Return the module of one of SOURCES, imported at the call.
+
+    A built-in cloud waits for no reader of files.
     """
     if source == "mesh":
         from lowalt.targets import mesh
@@ -49,14 +51,18 @@ def refuse_source(record: dict, inputs: Path | None) -> None:
 
 
 def make(record: dict, inputs: Path | None, seed: int) -> Cloud:
-    """Return the cloud of a merged record from the source it names; `inputs` is the folder of
-    meshes and recordings.
+    """Return the cloud of a merged record from the source it names.
+
+    inputs: the folder of meshes and recordings.
 
     Raises: InputError where the record or an input is wrong, or a folder is needed and none is
     given.
     """
     refuse_source(record, inputs)
     source = record["source"]
-    of_files = (inputs,) if source in ("mesh", "mocap") else ()
     cloud_of = getattr(source_module(source), f"{source}_cloud")
-    return check(cloud_of(record, *of_files, seed), record["subtype"])
+    if source in ("mesh", "mocap"):
+        cloud = cloud_of(record, inputs, seed)
+    else:
+        cloud = cloud_of(record, seed)
+    return check(cloud, record["subtype"])

@@ -1,5 +1,6 @@
-"""Turn a user's mesh into a calibration point cloud: load, repair, cut into parts, scale to the
-published size, thin.
+"""Turn a user's mesh into a calibration point cloud.
+
+It is loaded, repaired, cut into parts, scaled to the published size and thinned.
 
 These are the steps of the paper's Fig. 4. `mesh_files` reads files, `mesh_parts` cuts parts,
 `mesh_record` checks records and `mesh_size` scales; this module calls them in order and thins each
@@ -31,13 +32,15 @@ from lowalt.targets.surfaces import thin
 __all__ = ["check_record", "mesh_cloud"]
 
 DENSE = 200
-"""Number of dense surface samples per point of the cloud, before regions are cut out and the rest
-is thinned.
+"""Number of dense surface samples per point of the cloud.
+
+They are counted before regions are cut out and the rest is thinned.
 """
 
 THINNED = 25
-"""Largest number of samples per point of the cloud that are thinned; the time grows with samples x
-points.
+"""Largest number of samples per point of the cloud that are thinned.
+
+The time grows with samples x points.
 """
 
 FEWEST_SAMPLES = 100
@@ -61,10 +64,11 @@ def pools(
 
     def sampled(mesh: Mesh, is_body: bool) -> Pool:
         """The dense samples of a mesh."""
-        pool = pool_of(mesh, dense if is_body else dense // 4, rng)
-        if is_body:
-            regions = {name: part["region"] for name, part in parts.items() if "region" in part}
-            refuse_shared(pool, mesh, regions, where)
+        if not is_body:
+            return pool_of(mesh, dense // 4, rng)
+        pool = pool_of(mesh, dense, rng)
+        regions = {name: part["region"] for name, part in parts.items() if "region" in part}
+        refuse_shared(pool, mesh, regions, where)
         return pool
 
     def wheel(diameter: float, width: float) -> tuple[np.ndarray, np.ndarray]:
@@ -97,17 +101,19 @@ def _thinned(
             f"{where}: {len(pool.points)} dense samples, expected {count}: fewer points or a "
             "larger part"
         )
-    pick = np.arange(len(pool.points))
-    if len(pick) > pool.corners + THINNED * count:
-        pick = pool.corners + rng.choice(len(pick) - pool.corners, THINNED * count, replace=False)
-        pick = np.concatenate([np.arange(pool.corners), np.sort(pick)])
-    pick = pick[thin(pool.points[pick], count, rng, keep=np.arange(min(pool.corners, count)))]
-    return pool.points[pick], pool.normals[pick]
+    candidates = np.arange(len(pool.points))
+    if len(candidates) > pool.corners + THINNED * count:
+        others = rng.choice(len(candidates) - pool.corners, THINNED * count, replace=False)
+        candidates = np.concatenate([candidates[: pool.corners], pool.corners + np.sort(others)])
+    corners = np.arange(min(pool.corners, count))
+    chosen = candidates[thin(pool.points[candidates], count, rng, keep=corners)]
+    return pool.points[chosen], pool.normals[chosen]
 
 
 def mesh_cloud(record: dict, inputs_dir: str | Path, seed: int) -> Cloud:
-    """Return the cloud of a user's mesh: exactly record["points"] points, parts and hinges, at the
-    published size.
+    """Return the cloud of a user's mesh, with its parts and hinges, at the published size.
+
+    It has exactly record["points"] points.
 
     `record` is a merged record that `check_record` has passed; its files are relative to
     `inputs_dir`. Moving parts share record["moving_share"] of the points by area. Equal record,
@@ -120,8 +126,9 @@ def mesh_cloud(record: dict, inputs_dir: str | Path, seed: int) -> Cloud:
 def cloud_and_pools(
     record: dict, inputs_dir: str | Path, seed: int
 ) -> tuple[Cloud, dict[str, Pool], dict[str, Pool]]:
-    """Return the cloud as `mesh_cloud`, and every part's dense samples by name, as in the mesh and
-    as in the cloud.
+    """Return the cloud as `mesh_cloud`, and every part's dense samples by name.
+
+    The samples are given twice: as in the mesh, and as in the cloud.
     """
     where = record["subtype"]
     category = like(record)
@@ -138,29 +145,20 @@ def cloud_and_pools(
     scaled, facts = sized(record, raw, kinds, category)
     for warning in caught:
         warnings.warn(warning.message, warning.category, stacklevel=3)
-    doubts = list(
-        dict.fromkeys(
-            str(warning.message) for warning in caught if warning.category is InputWarning
-        )
-    )
+    doubts = [str(warning.message) for warning in caught if warning.category is InputWarning]
     names = list(scaled)
-    parts = [
-        Part(
-            name,
-            kinds[name],
-            (),
-            tuple(pool.hinge),
-            tuple(pool.axis),
-            weight=pool.area,
-            parent=names.index(parents[name]) if name in parents else -1,
-        )
-        for name, pool in scaled.items()
-    ]
+    parts = []
+    for name, pool in scaled.items():
+        hinge = tuple(pool.hinge)
+        axis = tuple(pool.axis)
+        parent = -1
+        if name in parents:
+            parent = names.index(parents[name])
+        parts.append(Part(name, kinds[name], (), hinge, axis, parent, weight=pool.area))
     counts = allot(parts, record["points"], record["moving_share"], where)
-    samples = [
-        _thinned(pool, count, f"{where}: parts.{name}", rng)
-        for (name, pool), count in zip(scaled.items(), counts, strict=True)
-    ]
+    samples = []
+    for (name, pool), count in zip(scaled.items(), counts, strict=True):
+        samples.append(_thinned(pool, count, f"{where}: parts.{name}", rng))
     sums = {name: sha256(Path(inputs_dir) / name) for name in files}
     facts |= {
         "closed_share": closed,
@@ -168,8 +166,6 @@ def cloud_and_pools(
         "checksum": checksum(sums),
         "seed": seed,
     }
-    return (
-        cloud_of_parts(parts, samples, record | facts | ({"warnings": doubts} if doubts else {})),
-        raw,
-        scaled,
-    )
+    if doubts:
+        facts["warnings"] = list(dict.fromkeys(doubts))
+    return cloud_of_parts(parts, samples, record | facts), raw, scaled

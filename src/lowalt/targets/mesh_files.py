@@ -22,13 +22,20 @@ from lowalt.files.atomic import existing
 from lowalt.files.errors import InputError, reading, warn
 from lowalt.numerics import portable
 from lowalt.targets.mesh_collada import for_trimesh, stated_metres, stated_up
-from lowalt.targets.mesh_polygons import Piece, read_obj, stated_unit
+from lowalt.targets.mesh_polygons import (
+    LARGEST_TRIANGLES,
+    MOST_MESH_BYTES,
+    Piece,
+    read_obj,
+    refuse_many,
+    stated_unit,
+)
 from lowalt.targets.surfaces import Surface, merged
 
 OWN_SUFFIXES = (".stl", ".obj", ".dae")
 UNITS_M = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
-LARGEST_TRIANGLES = 20_000_000
-"""A file with more triangles is refused, since its arrays alone would take over two gigabytes."""
+TEXT_BYTES = 100
+"""Least number of bytes of a triangle in a text STL file."""
 
 SAME_UNIT = 1e-6
 """Two units are the same if their relative difference is at most this."""
@@ -36,8 +43,11 @@ SAME_UNIT = 1e-6
 
 @dataclass(frozen=True)
 class Mesh(Surface):
-    """A repaired surface in metres along the file's axes: `component` (F,) the number of each
-    face's connected component, `closed` (C,) whether it is watertight."""
+    """A repaired surface in metres along the file's axes.
+
+    component: (F,) the number of each face's connected component; closed: (C,) whether it is
+    watertight.
+    """
 
     component: np.ndarray
     closed: np.ndarray
@@ -46,18 +56,20 @@ class Mesh(Surface):
 def joined(meshes: list[Mesh]) -> Mesh:
     """Return several meshes as one, components numbered on."""
     whole = merged(meshes)
-    first = np.cumsum([0] + [len(mesh.closed) for mesh in meshes[:-1]])
-    component = np.concatenate(
-        [mesh.component + start for mesh, start in zip(meshes, first, strict=True)]
-    )
-    return Mesh(
-        whole.vertices, whole.faces, component, np.concatenate([mesh.closed for mesh in meshes])
-    )
+    components = []
+    first = 0
+    for mesh in meshes:
+        components.append(mesh.component + first)
+        first += len(mesh.closed)
+    closed = np.concatenate([mesh.closed for mesh in meshes])
+    return Mesh(whole.vertices, whole.faces, np.concatenate(components), closed)
 
 
 def metres(unit: str | float) -> float:
     """Return the metres of a unit: one of UNITS_M by name, or the metres themselves."""
-    return UNITS_M[unit] if isinstance(unit, str) else float(unit)
+    if isinstance(unit, str):
+        return UNITS_M[unit]
+    return float(unit)
 
 
 def stated_unit_m(path: Path) -> float | None:
@@ -102,7 +114,9 @@ def _added(suffix: str) -> ModuleType | None:
     from lowalt.config.extensions import module_offered, offered
 
     readers = offered("meshes")
-    return module_offered("meshes", suffix, readers[suffix]) if suffix in readers else None
+    if suffix not in readers:
+        return None
+    return module_offered("meshes", suffix, readers[suffix])
 
 
 def _scene(path: Path) -> list[Piece]:
@@ -112,12 +126,12 @@ def _scene(path: Path) -> list[Piece]:
     # trimesh logs a traceback of every optional reader that it cannot import; failures are raised
     # below.
     logging.getLogger("trimesh").setLevel(logging.CRITICAL)
-    source = {"file_obj": path}
-    names = {}
+    names: dict[str, list[str]] = {}
     if path.suffix.lower() == ".dae":
         data, names = for_trimesh(path)
-        source = {"file_obj": io.BytesIO(data), "file_type": "dae"}
-    scene = trimesh.load_scene(**source, process=False)
+        scene = trimesh.load_scene(io.BytesIO(data), "dae", process=False)
+    else:
+        scene = trimesh.load_scene(path, process=False)
     result = []
     for node in sorted(scene.graph.nodes_geometry):
         pose, name = scene.graph[node]
@@ -127,23 +141,27 @@ def _scene(path: Path) -> list[Piece]:
         if not isinstance(mesh, trimesh.Trimesh):
             continue
         # trimesh numbers the surfaces of one geometry.
-        known = [key for key in names if re.fullmatch(re.escape(key) + r"(_\d+)?", name)]
-        more = names[known[0]] if known else []
-        chosen_by = tuple(dict.fromkeys((str(node), name, *more)))
-        piece = Piece(np.asarray(mesh.vertices), np.asarray(mesh.faces), chosen_by)
+        known = [key for key in names if re.fullmatch(re.escape(key) + r"(_\d+)?", str(name))]
+        chosen_by = [str(node), str(name)]
+        if known:
+            chosen_by += names[known[0]]
+        own = tuple(dict.fromkeys(chosen_by))
+        piece = Piece(np.asarray(mesh.vertices), np.asarray(mesh.faces), own)
         # Values that are not finite are refused later, by name.
         with np.errstate(invalid="ignore"):
             result.append(piece.mapped(pose[:3, :3]).moved(pose[:3, 3]))
     return result
 
 
-def _refuse_truncated(path: Path) -> None:
-    """Refuse a binary STL file that ends before the number of triangles that its header states.
+def _refuse_stl(path: Path) -> None:
+    """Refuse a binary STL file that ends before the number of triangles that its header states, and
+    a file of too many triangles, of which a text has at least TEXT_BYTES each.
 
     Raises: InputError naming the file and both numbers.
     """
     with path.open("rb") as file:
         head = file.read(1000)
+    # A binary STL has 80 bytes of text, the number of triangles in four, and 50 of each triangle.
     stated = int.from_bytes(head[80:84], "little")
     there = (path.stat().st_size - 84) // 50
     is_text = head.startswith(b"solid") and b"facet" in head
@@ -152,6 +170,10 @@ def _refuse_truncated(path: Path) -> None:
             f"{path}: the header states {stated} triangles and the file ends after {there}, "
             "expected the whole file: copy or export it again"
         )
+    if is_text:
+        there = path.stat().st_size // TEXT_BYTES
+    if there > LARGEST_TRIANGLES:
+        raise InputError(f"{path}: {there} triangles, expected at most {LARGEST_TRIANGLES}")
 
 
 def pieces(path: Path) -> list[Piece]:
@@ -160,7 +182,7 @@ def pieces(path: Path) -> list[Piece]:
     Raises: InputError naming the file and the reason: no such file, another format, or it cannot be
     read.
     """
-    path = existing(path, "mesh")
+    path = existing(path, "mesh", MOST_MESH_BYTES)
     kind = path.suffix.lower()
     added = _added(kind)
     if added is None and kind not in OWN_SUFFIXES:
@@ -170,8 +192,11 @@ def pieces(path: Path) -> list[Piece]:
         read = added.pieces
     with reading(path, f"{path.suffix} mesh"):
         if path.suffix.lower() == ".stl":
-            _refuse_truncated(path)
-        return [piece for piece in read(path) if len(piece.faces)]
+            _refuse_stl(path)
+        found = [piece for piece in read(path) if len(piece.faces)]
+        triangles = sum(len(piece.faces) for piece in found)
+        refuse_many(triangles, triangles)
+        return found
 
 
 def selected(path: Path, names: list[str] | None) -> list[Piece]:
@@ -237,7 +262,8 @@ def _repaired(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.n
 
 def edges_of(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the edges (E, 2) of triangles (F, 3), one triangle of each, and how many share it."""
-    edges = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
+    sides = [faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]
+    edges = np.sort(np.concatenate(sides), axis=1)
     key = edges[:, 0] * (int(faces.max()) + 1) + edges[:, 1]
     _, first, uses = np.unique(key, return_index=True, return_counts=True)
     return edges[first], first % len(faces), uses
@@ -249,7 +275,8 @@ def _mesh(vertices: np.ndarray, faces: np.ndarray) -> Mesh:
     Faces that share a vertex are connected.
     """
     links = np.concatenate([faces[:, :2], faces[:, 1:]])
-    graph = coo_array((np.ones(len(links), np.int8), links.T), shape=(len(vertices), len(vertices)))
+    count = len(vertices)
+    graph = coo_array((np.ones(len(links), np.int8), links.T), shape=(count, count))
     label = connected_components(graph, directed=False)[1]
     component = np.unique(label[faces[:, 0]], return_inverse=True)[1]
     closed = np.ones(int(component.max()) + 1, bool)
@@ -261,14 +288,14 @@ def _mesh(vertices: np.ndarray, faces: np.ndarray) -> Mesh:
     a, b, c = np.moveaxis(vertices[faces] - middle, 1, 0)
     volume = np.bincount(component, portable.dot(a, np.cross(b, c)), minlength=len(closed))
     inverted = closed & (volume < 0)
-    return Mesh(
-        vertices, np.where(inverted[component][:, None], faces[:, ::-1], faces), component, closed
-    )
+    outward = np.where(inverted[component][:, None], faces[:, ::-1], faces)
+    return Mesh(vertices, outward, component, closed)
 
 
 def read_mesh(path: str | Path, unit: str | float, geometry: list[str] | None = None) -> Mesh:
-    """Return the repaired mesh of a file of a format in `suffixes`, in metres along the file's own
-    axes.
+    """Return the repaired mesh of a file of a format in `suffixes`.
+
+    It is in metres along the file's own axes.
 
     `unit` is the length unit of the file's numbers (m, cm, mm, in, ft, or its metres), `geometry`
     the names of the scene's geometries, instances, objects or groups to take (all by default). Open
@@ -286,13 +313,10 @@ def read_mesh(path: str | Path, unit: str | float, geometry: list[str] | None = 
     faces = np.asarray(whole.faces, np.int64)
     stated = stated_unit_m(path)
     if stated is not None and abs(stated / metres(unit) - 1) > SAME_UNIT:
-        text = (
+        warn(
             f"{path}: the file states a unit of {stated:g} m, the record says {unit}; the record "
             "is followed"
         )
-        warn(text)
-    if len(faces) > LARGEST_TRIANGLES:
-        raise InputError(f"{path}: {len(faces)} triangles, expected at most {LARGEST_TRIANGLES}")
     # One mark per vertex: a copy of millions of corners would double the memory.
     finite = np.isfinite(vertices).all(axis=1)
     if faces.min() < 0 or faces.max() >= len(vertices) or not finite[faces].all():

@@ -1,5 +1,6 @@
-"""From repaired meshes to parts: placing, cutting regions, finding hinges. All in metres along the
-file's axes.
+"""From repaired meshes to parts: placing, cutting regions, finding hinges.
+
+All in metres along the file's axes.
 
 A part is a pool of dense samples of its surface. This module decides which samples belong to which
 part; `mesh_size` scales and moves the target later.
@@ -26,9 +27,11 @@ SHARED_LIMIT = 0.01
 
 @dataclass(frozen=True)
 class Pool:
-    """Dense samples of one part: `points` (N, 3) m, `normals` (N, 3), `component` (N,) of the mesh,
-    the first `corners` of them vertices that bound the surface, `area` in m2; `hinge` (3,) and
-    `axis` (3,), NaN for a body."""
+    """Dense samples of one part.
+
+    points: (N, 3) m, the first `corners` of them vertices that bound the surface; normals: (N, 3);
+    component: (N,) of the mesh; area: in m2; hinge: (3,) and axis: (3,), NaN for a body.
+    """
 
     points: np.ndarray
     normals: np.ndarray
@@ -51,19 +54,21 @@ class Pool:
 
 
 def surface(part: dict, record: dict, inputs_dir: Path) -> Mesh:
-    """Return the meshes of a part's files as one, each mirrored, turned and moved as the record
-    says, in that order.
+    """Return the meshes of a part's files as one.
+
+    Each is mirrored, turned and moved as the record says, in that order.
     """
     meshes = []
     for item in part["meshes"]:
-        mesh = read_mesh(
-            inputs_dir / item["file"], item.get("unit", record["unit"]), item.get("geometry")
-        )
+        unit = item.get("unit", record["unit"])
+        mesh = read_mesh(inputs_dir / item["file"], unit, item.get("geometry"))
         matrix = np.eye(3)
-        turns = item.get("turn", [])
         if "mirror" in item:
             matrix["xyz".index(item["mirror"])] *= -1
-        for turn in turns if isinstance(turns, list) else [turns]:
+        turns = item.get("turn", [])
+        if not isinstance(turns, list):
+            turns = [turns]
+        for turn in turns:
             matrix = portable.product(rotation(turn["axis"], np.radians(turn["deg"])), matrix)
         meshes.append(mesh.mapped(matrix).moved(item.get("move", [0.0, 0, 0])))
     return joined(meshes)
@@ -91,7 +96,7 @@ def inside(points: np.ndarray, region: dict) -> np.ndarray:
         lowest, highest = region["box"]
         low = np.array([-np.inf if value is None else value for value in lowest], float)
         high = np.array([np.inf if value is None else value for value in highest], float)
-        return ((points >= low) & (points <= high)).all(axis=1)
+        return np.all((points >= low) & (points <= high), axis=1)
     cylinder = region["cylinder"]
     away = points - np.array(cylinder["centre"])
     axis = "xyz".index(cylinder["axis"])
@@ -138,12 +143,14 @@ def _made_wheel(
     samples: tuple[np.ndarray, np.ndarray],
     frame: np.ndarray,
 ) -> Pool:
-    """The pool of a made wheel of a diameter and a width at its hinge, in the file's axes, mirrored
-    on the left.
+    """The pool of a made wheel of a diameter and a width at its hinge, in the file's axes.
+
+    It is mirrored on the left.
     """
     diameter, width = size
     side = np.array([np.sign(portable.dot(frame[0], hinge)) or 1.0, 1, 1])
-    points, normals = (portable.applied(frame.T, array * side) for array in samples)
+    points = portable.applied(frame.T, samples[0] * side)
+    normals = portable.applied(frame.T, samples[1] * side)
     area = np.pi * diameter * (diameter / 2 + width)
     # `sample_part` puts the points that bound the wheel first, six of them.
     return Pool(points + hinge, normals, np.zeros(len(points), np.int64), 6, area)
@@ -156,12 +163,13 @@ def cut_parts(
     sampled: Callable[[Mesh, bool], Pool],
     wheel: Callable[[float, float], tuple[np.ndarray, np.ndarray]],
 ) -> tuple[dict[str, Pool], Mesh]:
-    """Return the pool of every part of a checked mesh record by name, the body first, and the mesh
-    of the body.
+    """Return the pool of every part of a checked mesh record by name, and the mesh of the body.
 
-    sampled: gives the pool of a mesh and whether it is the body; wheel: gives points and normals
-    (N, 3) of a made right wheel at the origin, in body axes, from its diameter and width (m); frame
-    (3, 3): body axes in the file's.
+    The body's pool comes first.
+
+    sampled: gives the pool of a mesh, told whether that is the body; wheel: gives points and
+    normals (N, 3) of a made right wheel at the origin, in body axes, from its diameter and width
+    (m); frame (3, 3): body axes in the file's.
     Raises: InputError naming the file, or the part whose region holds nothing.
     """
     where = record["subtype"]
@@ -169,21 +177,21 @@ def cut_parts(
     mesh = surface(body_part, record, inputs_dir)
     body = sampled(mesh, True)
     pools = {}
-    sizes = {
-        name: (part["wheel"]["diameter_m"], part["wheel"]["width_m"])
-        for name, part in moving
-        if "wheel" in part
-    }
-    made = {size: wheel(*size) for size in dict.fromkeys(sizes.values())}
+    # Wheels of one size have the same samples, drawn before any other part's.
+    made = {}
+    for _, part in moving:
+        if "wheel" in part:
+            size = (part["wheel"]["diameter_m"], part["wheel"]["width_m"])
+            if size not in made:
+                made[size] = wheel(*size)
     for name, part in moving:
         if "region" in part:
             mask = taken(body, mesh, part["region"])
             pools[name] = body.picked(mask)
             body = body.picked(~mask)
         elif "wheel" in part:
-            pools[name] = _made_wheel(
-                sizes[name], np.array(part["hinge"], float), made[sizes[name]], frame
-            )
+            size = (part["wheel"]["diameter_m"], part["wheel"]["width_m"])
+            pools[name] = _made_wheel(size, np.array(part["hinge"], float), made[size], frame)
         else:
             pools[name] = sampled(surface(part, record, inputs_dir), False)
         if not len(pools[name].points):
@@ -202,8 +210,7 @@ def cut_parts(
 
 
 def hinged(pool: Pool, part: dict, up: np.ndarray, front: np.ndarray, where: str) -> Pool:
-    """Return the pool with its hinge and unit axis, given by the record's part or found from its
-    samples.
+    """Return the pool with its hinge and unit axis, given by the record or found from its samples.
 
     Where the record says "found", the hinge is the middle of a wheel's extents or the mean of a
     rotor's samples, and the axis is the direction in which the samples are thinnest. Where it names
@@ -219,9 +226,9 @@ def hinged(pool: Pool, part: dict, up: np.ndarray, front: np.ndarray, where: str
     axis = part.get("axis", {"wheel": right, "wing": front}.get(kind, "found"))
     centre = portable.mean(pool.points, 0)
     if isinstance(hinge, str):
-        hinge = (
-            (pool.points.min(axis=0) + pool.points.max(axis=0)) / 2 if kind == "wheel" else centre
-        )
+        hinge = centre
+        if kind == "wheel":
+            hinge = (pool.points.min(axis=0) + pool.points.max(axis=0)) / 2
     if isinstance(axis, str):
         if len(pool.points) < 4:
             raise InputError(
@@ -232,9 +239,9 @@ def hinged(pool: Pool, part: dict, up: np.ndarray, front: np.ndarray, where: str
     axis = np.array(axis, float)
     axis = axis / portable.norm(axis)
     if kind == "rotor":
-        axis = (
-            axis * np.sign(portable.dot(axis, up) or 1) * (-1 if part.get("sense") == "cw" else 1)
-        )
+        axis = axis * np.sign(portable.dot(axis, up) or 1)
+        if part.get("sense") == "cw":
+            axis = -axis
     elif kind == "wheel":
         axis = axis * -np.sign(portable.dot(axis, right) or 1)
     else:

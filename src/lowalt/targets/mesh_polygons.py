@@ -1,5 +1,6 @@
-"""Pieces of mesh files, and OBJ files as viewers show them: a polygon with a dent is cut by earcut,
-not as a fan.
+"""Pieces of mesh files, and OBJ files as viewers show them.
+
+A polygon with a dent is cut by earcut, not as a fan.
 
 Vertices, faces and the names of objects, groups and materials are read. trimesh counts negative
 indices from the file's end, cuts polygons as fans and splits by one kind of name at a time.
@@ -7,12 +8,15 @@ Source: Wavefront's Object Files (.obj), version 3.0.
 """
 
 import re
+from array import array
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
+from lowalt.files.atomic import LONGEST_LINE, text_file
 from lowalt.files.errors import InputError
 from lowalt.numerics import portable
 from lowalt.targets.surfaces import Surface
@@ -29,10 +33,29 @@ class Piece(Surface):
     names: tuple[str, ...]
 
 
-FLAT = 1e-9
-"""A corner dents its polygon where its turn against the polygon's sense is more than this share of
-the area.
+MOST_MESH_BYTES = 2 << 30
+"""Largest size of a mesh file: twenty million triangles as binary STL take half of it."""
+LARGEST_TRIANGLES = 20_000_000
+"""A surface of more triangles is refused, since its arrays alone would take over two gigabytes."""
+REPEATED_TRIANGLES = 2_000_000
+MOST_EAR_STEPS = 1_000_000_000
+"""Bound on the sum over polygons with a dent of the square of their corners: earcut takes a time in
+proportion to it.
 """
+FLAT = 1e-9
+"""Share of a polygon's area from which on a corner's turn against its sense is a dent."""
+
+
+def refuse_many(shown: int, own: int) -> None:
+    """Refuse a file that shows too many triangles; readers call this before they make them.
+
+    own: those that stand in the file, each once. A file may show one surface many times, but a
+    small one may not fill the memory.
+    Raises: InputError naming both numbers.
+    """
+    most = min(LARGEST_TRIANGLES, REPEATED_TRIANGLES + 4 * own)
+    if shown > most:
+        raise InputError(f"more than {most} triangles, expected fewer")
 
 
 def triangulated(
@@ -42,8 +65,11 @@ def triangulated(
 
     vertices: (V, 3); counts: (P,) corners of each polygon; corners: the polygons' corners one after
     the other, indices of vertices. Polygons of fewer than three corners have no triangle.
-    Raises: InputError where a corner is no vertex.
+    Raises: InputError where a corner is no vertex, for more than LARGEST_TRIANGLES, and for dented
+    polygons of too many corners.
     """
+    triangles = int(counts.sum()) - 2 * len(counts)
+    refuse_many(triangles, triangles)
     missing = len(corners) != counts.sum()
     outside = len(corners) > 0 and not 0 <= corners.min() <= corners.max() < len(vertices)
     if missing or outside:
@@ -51,13 +77,20 @@ def triangulated(
     starts = np.cumsum(counts) - counts
     faces = [np.zeros((0, 3), int)]
     owners = [np.zeros(0, int)]
+    steps = 0
     for size in np.unique(counts[counts >= 3]):
         which = np.flatnonzero(counts == size)
         ring = corners[starts[which, None] + np.arange(size)]
         first = np.repeat(ring[:, :1], size - 2, axis=1)
         fan = np.stack([first, ring[:, 1:-1], ring[:, 2:]], axis=2)
         if size > 3:
-            for row in _dented(vertices[ring]):
+            dented = _dented(vertices[ring])
+            steps += len(dented) * int(size) ** 2
+            if steps > MOST_EAR_STEPS:
+                raise InputError(
+                    f"polygons with dents and up to {size} corners, expected triangles"
+                )
+            for row in dented:
                 fan[row] = _ears(vertices[ring[row]], ring[row], fan[row])
         faces.append(fan.reshape(-1, 3))
         owners.append(np.repeat(which, size - 2))
@@ -116,37 +149,67 @@ def _vertex_index(stated: int, so_far: int) -> int:
     return -1
 
 
+def _lines(path: Path) -> Iterator[tuple[int, str]]:
+    """The number and text of each line of an OBJ file, continued lines as one.
+
+    Raises: InputError naming the file where a line is too long.
+    """
+    parts: list[str] = []
+    length = 0
+    first = 1
+    with text_file(path, "mesh", MOST_MESH_BYTES, "replace") as file:
+        for number, text in enumerate(file, 1):
+            line = text.rstrip("\r\n")
+            more = line.endswith("\\")
+            parts.append(line[:-1] if more else line)
+            length += len(line)
+            if length > LONGEST_LINE:
+                raise InputError(f"{path}: line {first} is continued too often, expected triangles")
+            if more:
+                continue
+            yield first, " ".join(parts).strip()
+            parts.clear()
+            length = 0
+            first = number + 1
+    yield first, " ".join(parts).strip()
+
+
 def read_obj(path: Path) -> list[Piece]:
     """Return the surface of each object, group and material of a file.
 
-    Raises: InputError naming the file and the line that cannot be read, or the face that has no
-    such vertex.
+    Raises: InputError naming the file and the line that cannot be read, the face that has no such
+    vertex, or for more than LARGEST_TRIANGLES.
     """
-    positions: list[list[float]] = []
-    corners: list[int] = []
-    counts: list[int] = []
-    owners: list[int] = []
+    # Arrays of machine numbers: lists of Python's would take ten times the memory.
+    positions = array("d")
+    corners = array("q")
+    counts = array("q")
+    owners = array("q")
     keys: dict[_Names, int] = {}
     now = dict.fromkeys(NAMES, "")
-    text = path.read_text(encoding="utf-8-sig", errors="replace").replace("\\\n", " ")
-    for number, line in enumerate(text.splitlines(), 1):
-        word, _, values = line.strip().partition(" ")
+    for number, line in _lines(path):
+        word, _, values = line.partition(" ")
         try:
             if word == "v":
-                positions.append([*map(float, values.split()[:3])])
-                if len(positions[-1]) < 3:
+                place = [*map(float, values.split()[:3])]
+                if len(place) < 3:
                     raise ValueError("fewer than three coordinates")
+                positions.extend(place)
             elif word == "f":
-                face = [int(corner.split("/", 1)[0]) for corner in values.split("#", 1)[0].split()]
-                corners += [_vertex_index(stated, len(positions)) for stated in face]
+                stated_corners = values.split("#", 1)[0].split()
+                face = [int(corner.split("/", 1)[0]) for corner in stated_corners]
+                so_far = len(positions) // 3
+                corners.extend(_vertex_index(stated, so_far) for stated in face)
                 counts.append(len(face))
                 owners.append(keys.setdefault(_Names(*now.values()), len(keys)))
             elif word in NAMES:
                 now[word] = values.strip()
         except (ValueError, OverflowError) as error:
             raise InputError(
-                f"{path}: line {number}: {line.strip()[:60]!r} cannot be read ({error})"
+                f"{path}: line {number}: {line[:60]!r} cannot be read ({error})"
             ) from None
+        if len(corners) > 3 * LARGEST_TRIANGLES or len(positions) > 9 * LARGEST_TRIANGLES:
+            raise InputError(f"{path}: more than {LARGEST_TRIANGLES} triangles, expected fewer")
     vertices = np.array(positions, float).reshape(-1, 3)
     faces, polygon = triangulated(vertices, np.array(counts, int), np.array(corners, int))
     owner = np.array(owners, int)[polygon]
@@ -156,8 +219,11 @@ def read_obj(path: Path) -> list[Piece]:
     base = next((names.object for names in keys if names.object), path.name)
     materials = list(dict.fromkeys(names.material for names in keys))[::-1]
     older = {name: f"{base}_{index}" if index else base for index, name in enumerate(materials)}
-    for names, index in keys.items():
-        used, inverse = np.unique(faces[owner == index], return_inverse=True)
+    faces = faces[np.argsort(owner, kind="stable")]
+    ends = np.cumsum(np.bincount(owner, minlength=len(keys)))
+    for (names, index), end in zip(keys.items(), ends, strict=True):
+        first = ends[index - 1] if index else 0
+        used, inverse = np.unique(faces[first:end], return_inverse=True)
         known = [name for name in names if name] or [path.name]
         if len(materials) > 1 and older[names.material] not in objects:
             known.append(older[names.material])
@@ -178,7 +244,7 @@ def stated_unit(path: Path) -> str:
         "in": "inch(?:es)?|in",
         "ft": "f(?:ee|oo)t|ft",
     }
-    with path.open(errors="replace") as file:
+    with text_file(path, "mesh", MOST_MESH_BYTES, "replace") as file:
         for line, _ in zip(file, range(200), strict=False):
             stated = re.match(
                 r"\s*#.*\bunits?\b\W*(?:(?:in|is|are)\b)?\W*1?\W*([a-z]+)", line, re.IGNORECASE

@@ -1,6 +1,6 @@
 """The keys and values of a mesh record, checked before any file is opened.
 
-All places are along the axes of the mesh file, before scaling, in metres. The order of keys and
+All positions are along the axes of the mesh file, before scaling, in metres. The order of keys and
 parts changes nothing. `records.schema.yaml` lists the keys with their meaning.
 """
 
@@ -20,15 +20,19 @@ MOVING_KIND = {"UAV": "rotor", "Bird": "wing", "Vehicle": "wheel"}
 
 def body_axes(front: str, up: str) -> np.ndarray:
     """Return the unit vectors (3, 3) right, front and up, of the names of two axes such as "-y"."""
-    vectors = [
-        np.eye(3)["xyz".index(axis[-1])] * (-1 if axis[0] == "-" else 1) for axis in (front, up)
-    ]
+    vectors = []
+    for axis in (front, up):
+        vector = np.eye(3)["xyz".index(axis[-1])]
+        if axis[0] == "-":
+            vector = vector * -1
+        vectors.append(vector)
     return np.stack([np.cross(*vectors), *vectors])
 
 
 def ordered_parts(parts: dict[str, dict]) -> dict[str, dict]:
-    """Return a record's parts in the one order that all stages use: the body, then the others by
-    name, each part after its parent.
+    """Return a record's parts in the one order that all stages use.
+
+    The body comes first, then the others by name, each part after its parent.
 
     A record loses the order of its keys on its way through the workflow's settings, so the order as
     written must not matter. `parts` are those of a record that `check_record` has passed.
@@ -47,11 +51,9 @@ def _part_fault(name: str, part: dict, parts: dict[str, dict], category: str) ->
     """Return the fault of a part whose form is right, or None."""
     kind = part["kind"]
     if kind == "body":
-        return (
-            None
-            if "meshes" in part and len(part) == 2
-            else "a body has a kind and meshes, nothing else"
-        )
+        if set(part) == {"kind", "meshes"}:
+            return None
+        return "a body has a kind and meshes, nothing else"
     if kind != MOVING_KIND[category]:
         return f"kind is {kind}, expected {MOVING_KIND[category]} for a {category}"
     if "wheel" in part and (kind != "wheel" or part.get("hinge", "found") == "found"):
@@ -66,12 +68,11 @@ def _part_fault(name: str, part: dict, parts: dict[str, dict], category: str) ->
         )
         if part["parent"] not in moving:
             return f"parent is {part['parent']!r}, expected one of {moving}"
-        above = [part["parent"]]
-        while above[-1] != name and (parent := parts.get(above[-1], {}).get("parent")) not in (
-            None,
-            *above,
-        ):
+        above = []
+        parent = part["parent"]
+        while parent is not None and parent not in above:
             above.append(parent)
+            parent = parts.get(parent, {}).get("parent")
         if name in above:
             return (
                 f"parent is {part['parent']!r}, which hangs on {name!r} itself, expected no circle"
@@ -106,11 +107,14 @@ def check_record(merged: dict, where: str) -> dict:
     for name, part in merged["parts"].items():
         if fault := _part_fault(name, part, merged["parts"], category):
             raise InputError(f"{where}: parts.{name}: {fault}")
-    of_vehicle = {"size_is": ALL_AXES, "wheel_size": "published"} if category == "Vehicle" else {}
-    result = DEFAULTS | {"moving_share": MOVING_SHARE[category]} | of_vehicle | merged
+    defaults = DEFAULTS | {"moving_share": MOVING_SHARE[category]}
+    sizes: tuple[str, ...] = SIZES
+    if category == "Vehicle":
+        defaults |= {"size_is": ALL_AXES, "wheel_size": "published"}
+        sizes = (ALL_AXES,)
+    result = defaults | merged
     result["parts"] = ordered_parts(merged["parts"])
     size = result.get("size_is")
-    sizes = (ALL_AXES,) if of_vehicle else SIZES
     if size not in sizes:
         raise InputError(f"{where}: size_is is {size!r}, expected one of {sizes} for a {category}")
     return result

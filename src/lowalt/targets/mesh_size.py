@@ -29,8 +29,10 @@ ACROSS = np.cos(np.radians(20.0))
 ROUND = 1.1
 """Largest ratio of a wheel's width to the smaller of its two extents across the axis."""
 OFF_HUB = 1.0
-"""Largest distance between a rotor's hub and the middle of its surface, as a share of the rotor's
-largest extent: that of a single blade without its hub."""
+"""Largest distance between a rotor's hub and the middle of its surface.
+
+It is a share of the rotor's largest extent: that of a single blade without its hub.
+"""
 FEWEST_WHEELS = 3
 OFF_MIDDLE = 0.1
 """A part stands on one side where it is farther from the middle than this share of its own size."""
@@ -203,19 +205,16 @@ def _refuse_size(
     else:
         key = "len_m" if record["size_is"] == ALL_AXES else "size_m"
         own = f"`row: {{{key}: {row_m or size_m:.4g}}}`"
-        fitting = (
-            f"`unit: {metres(unit) * wanted_m / max(size_m, 1e-12):.4g}` (metres for 1.0 in the "
-            "file)"
-        )
-        size = f"`lowalt target new --size {whole_m * wanted_m / max(size_m, 1e-12):.4g}`"
+        fitting = f"`unit: {metres(unit) * ratio:.4g}` (metres for 1.0 in the file)"
+        size = f"`lowalt target new --size {whole_m * ratio:.4g}`"
         way = (
             f"no unit fits: write {fitting} or draft it with {size}, or give it a row with its own "
             f"size, {own}"
         )
+    off = max(ratio, size_m / wanted_m)
     raise InputError(
         f"{record['subtype']}: {measure} measures {size_m:.4g} m where {wanted_m:.4g} m is "
-        f"published: {max(wanted_m / max(size_m, 1e-12), size_m / wanted_m):.3g} times off; is the "
-        f"unit {unit!r} right? {way}"
+        f"published: {off:.3g} times off; is the unit {unit!r} right? {way}"
     )
 
 
@@ -318,12 +317,13 @@ def sized(
             points = (pool.points - pool.hinge) * (diameter / raw) + hinge
             result[name] = replace(pool, points=points, hinge=hinge)
             facts["wheel_diameter_m"] = diameter
-        diameter = 2 * _turned_radius(result[name]) if kinds[name] == "rotor" else np.inf
-        if diameter < SMALLEST_ROTOR_M:
-            raise InputError(
-                f"{record['subtype']}: rotor {name} has a diameter of {diameter:.2g} m at the "
-                f"final size, expected at least {SMALLEST_ROTOR_M} m"
-            )
+        if kinds[name] == "rotor":
+            diameter = 2 * _turned_radius(result[name])
+            if diameter < SMALLEST_ROTOR_M:
+                raise InputError(
+                    f"{record['subtype']}: rotor {name} has a diameter of {diameter:.2g} m at the "
+                    f"final size, expected at least {SMALLEST_ROTOR_M} m"
+                )
     low, high = _bounds(result)
     middle = (low + high) / 2
     hubs = [pool.hinge[:2] for name, pool in result.items() if kinds[name] == "rotor"]

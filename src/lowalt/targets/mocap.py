@@ -80,11 +80,12 @@ def _read(paths: list[Path], record: dict) -> tuple[mocap_motion.Motion, int]:
         raise InputError(f"{path}: format {kind!r}, expected .amc with its skeleton, .bvh or .npz")
     joints, rate = read_bvh(path) if kind == ".bvh" else read_joints(path)
     nodes = to_nodes(joints, str(path))[first - 1 : last]
-    if "rate_hz" not in record and rate is None:
+    rate = record.get("rate_hz", rate)
+    if rate is None:
         raise InputError(f"{path}: says no rate, expected rate_hz in the record")
     # A BVH has no unit: its person gets the published height.
     height = record["published"]["hgt_m"] if kind == ".bvh" else None
-    return moved(nodes, record.get("rate_hz", rate), height, str(path)), first
+    return moved(nodes, rate, height, str(path)), first
 
 
 def mocap_cloud(record: dict, inputs_dir: str | Path, seed: int) -> Cloud:

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.files.atomic import existing
+from lowalt.files.atomic import existing, text_file
 from lowalt.files.errors import InputError
 from lowalt.numerics import portable
 from lowalt.targets.skeleton import LIMBS, NODES
@@ -38,9 +38,10 @@ class Skeleton:
 
 def _lines(path: Path) -> Iterator[list[str]]:
     """The words of each line of a file, without comments; lines without a word are left out."""
-    for line in path.read_text(encoding="utf-8-sig", errors="replace").splitlines():
-        if words := line.split("#", 1)[0].split():
-            yield words
+    with text_file(path, "motion file", errors="replace") as file:
+        for line in file:
+            if words := line.split("#", 1)[0].split():
+                yield words
 
 
 def _sections(path: Path) -> dict[str, list[list[str]]]:
@@ -69,7 +70,7 @@ def _blocks(lines: list[list[str]]) -> dict[str, dict[str, list[str]]]:
 
 def _refuse_other_nodes(path: Path, hierarchy: list[list[str]]) -> None:
     """Raise InputError where the lines `parent child child ...` are not those of the 31 nodes."""
-    parents = {}
+    parents: dict[str, str] = {}
     for parent, *children in hierarchy:
         parents |= dict.fromkeys(children, parent)
     if parents != LIMBS:
@@ -240,7 +241,8 @@ def read_motion(
             f"{path}: frame {empty[0]} has an all-zero root, expected a tracked one (begin by "
             "first_frame)"
         )
-    still = np.all([(values[1:] == values[:-1]).all(axis=1) for values in motion.values()], axis=0)
+    same = [(values[1:] == values[:-1]).all(axis=1) for values in motion.values()]
+    still = np.all(same, axis=0)
     if still.any():
         frame = first + 1 + int(np.argmax(still))
         raise InputError(

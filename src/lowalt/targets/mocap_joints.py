@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from lowalt.files.array_files import UNREADABLE, checked_archive
-from lowalt.files.atomic import existing
+from lowalt.files.atomic import text_of
 from lowalt.files.errors import InputError, reading
 from lowalt.numerics import portable
 from lowalt.targets.mocap_motion import Motion
@@ -63,6 +63,10 @@ BEYOND = {"wrist": 0.1, "hand": 0.35, "fingers": 0.6, "thumb": 0.35}
 RATES = ("mocap_framerate", "mocap_frame_rate", "fps")
 """Names of a frame rate (Hz) in an .npz file, the surest first."""
 MOST_NUMBERS = 100_000_000
+FREE_NUMBERS = 3_000_000
+MOST_EXPANSION = 100
+"""Numbers of positions and turns that a file may make: this many, or so many times its own."""
+MOST_BVH_BYTES = 256 << 20
 
 
 class _Joint(NamedTuple):
@@ -91,23 +95,25 @@ def to_nodes(joints: dict[str, np.ndarray], where: str) -> np.ndarray:
     """
     known = {_plain(name): name for name in reversed(list(joints)) if not name.endswith("/end")}
 
-    def joint(part: str, side: str = "", but: str = "") -> str:
-        """The name of a joint."""
-        for word in NAMES[part].split():
+    def joint(meaning: str, side: str = "", but: str = "") -> str:
+        """The name of the joint that joins what `meaning` says, other than the joint `but`."""
+        for word in NAMES[meaning].split():
             if (side, word) in known and known[side, word] != but:
                 return known[side, word]
         side = {"l": "left ", "r": "right "}.get(side, "")
         raise InputError(
-            f"{where}: no joint is called a {side}{part}, expected {NAMES[part].split()} among "
-            f"{sorted(joints)[:40]}"
+            f"{where}: no joint is called a {side}{meaning}, expected {NAMES[meaning].split()} "
+            f"among {sorted(joints)[:40]}"
         )
 
-    places = {"root": joints[joint("root")]}
+    positions = {"root": joints[joint("root")]}
     for side in "lr":
         ankle = joint("ankle", side)
         knee = joint("knee", side)
         # A foot without a toe ends in the end of its chain.
-        toe = f"{ankle}/end" if f"{ankle}/end" in joints else joint("toe", side, but=ankle)
+        toe = f"{ankle}/end"
+        if toe not in joints:
+            toe = joint("toe", side, but=ankle)
         elbow = joints[joint("elbow", side)]
         wrist = joints[joint("wrist", side)]
         toes = joints.get(f"{toe}/end", joints[toe] + 0.3 * (joints[toe] - joints[ankle]))
@@ -122,19 +128,18 @@ def to_nodes(joints: dict[str, np.ndarray], where: str) -> np.ndarray:
             "radius": wrist,
         }
         limbs |= {name: wrist + share * (wrist - elbow) for name, share in BEYOND.items()}
-        places |= {side + name: place for name, place in limbs.items()}
+        positions |= {side + name: position for name, position in limbs.items()}
     head = joint("head")
     skull = joints[head]
-    neck = (
-        places["lclavicle"] + places["rclavicle"]
-    ) / 2  # between the shoulders, where no joint is a neck
+    # Between the shoulders, where no joint is a neck.
+    neck = (positions["lclavicle"] + positions["rclavicle"]) / 2
     if any(("", word) in known for word in NAMES["neck"].split()):
         neck = joints[joint("neck")]
     top = joints.get(f"{head}/end", skull + 0.8 * (skull - neck))
     for name, share in (("lowerback", 1 / 3), ("upperback", 2 / 3), ("thorax", 1.0)):
-        places[name] = places["root"] + share * (neck - places["root"])
-    places |= {"lowerneck": (neck + skull) / 2, "upperneck": skull, "head": top}
-    return np.stack([places[name] for name in NODES], axis=1)
+        positions[name] = positions["root"] + share * (neck - positions["root"])
+    positions |= {"lowerneck": (neck + skull) / 2, "upperneck": skull, "head": top}
+    return np.stack([positions[name] for name in NODES], axis=1)
 
 
 def moved(nodes: np.ndarray, rate_hz: float, height_m: float | None, where: str) -> Motion:
@@ -143,26 +148,31 @@ def moved(nodes: np.ndarray, rate_hz: float, height_m: float | None, where: str)
     height_m: the stature of whom they show, which gives the unit; None where they are in metres.
     Bones have their mean lengths; each turns from its mean direction to that of the frame on the
     shortest way. The vertical axis is the one along which the head is farthest from the feet.
-    Raises: InputError naming `where` for places that are not finite or a body without height.
+    Raises: InputError naming `where` for positions that are not finite or a body without height.
     """
     if not np.isfinite(nodes).all() or len(nodes) < 2 or np.abs(nodes).max() > 1e6:
         raise InputError(
             f"{where}: {len(nodes)} frames with places that are not finite, expected two good ones "
             "or more"
         )
-    reach = np.mean(nodes[:, NODES.index("head")] - nodes[:, NODES.index("ltibia")], axis=0)
+    head = nodes[:, NODES.index("head")]
+    shin = nodes[:, NODES.index("ltibia")]
+    reach = np.mean(head - shin, axis=0)
     axis = int(np.abs(reach).argmax())
     order = [(axis + 1) % 3, (axis + 2) % 3, axis]  # a proper rotation: z becomes the vertical
-    nodes = nodes[..., order] * ([1, 1, 1] if reach[axis] > 0 else [1, -1, -1])
+    nodes = nodes[..., order]
+    if reach[axis] <= 0:
+        nodes = nodes * [1, -1, -1]
     bones = nodes - nodes[:, PARENTS]
     bones[:, 0] = 0
     length = portable.norm(bones).mean(axis=0)
     mean = bones.mean(axis=0)
     size = portable.norm(mean)
-    rest_bones = np.where(
-        (size > 0)[:, None], mean / np.where(size > 0, size, 1)[:, None] * length[:, None], 0.0
-    )
-    unit = height_m / stature_m(rest_bones) if height_m else 1.0
+    directions = mean / np.where(size > 0, size, 1)[:, None]
+    rest_bones = np.where((size > 0)[:, None], directions * length[:, None], 0.0)
+    unit = 1.0
+    if height_m:
+        unit = height_m / stature_m(rest_bones)
     if not 0 < unit < np.inf:
         raise InputError(f"{where}: a body of no height, expected joints of a person")
     return Motion(nodes[:, 0] * unit, _shortest(rest_bones, bones), rest_bones * unit, rate_hz)
@@ -176,7 +186,8 @@ def _shortest(rest_bones: np.ndarray, bones: np.ndarray) -> np.ndarray:
     cosine = portable.dot(a, b)
     x, y, z = np.moveaxis(cross, -1, 0)
     zero = np.zeros_like(x)
-    skew = np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=-1).reshape(*x.shape, 3, 3)
+    entries = [zero, -z, y, z, zero, -x, -y, x, zero]
+    skew = np.stack(entries, axis=-1).reshape(*x.shape, 3, 3)
     factor = 1 / np.maximum(1 + cosine, 1e-6)
     return np.eye(3) + skew + factor[..., None, None] * portable.product(skew, skew)
 
@@ -187,17 +198,17 @@ def read_bvh(path: str | Path) -> tuple[dict[str, np.ndarray], float]:
     The end of a chain is named `NAME/end` after the chain's last joint.
     Raises: InputError naming the file and the joint or frame that is wrong.
     """
-    path = existing(path, "motion file")
-    head, _, data = path.read_text(encoding="utf-8-sig", errors="replace").partition("MOTION")
+    head, _, data = text_of(path, "motion file", MOST_BVH_BYTES, "replace").partition("MOTION")
     stack: list[str] = []
     joints: list[_Joint] = []
     words = iter(re.sub(r"#.*", "", head).split())
     with reading(path, "BVH motion"):
         for word in words:
             if word in ("ROOT", "JOINT", "End"):
-                name = next(words)  # after End the word Site
-                name = f"{stack[-1]}/end" if word == "End" else name
                 parent = stack[-1] if stack else ""
+                name = next(words)
+                if word == "End":  # followed by the word Site, which is no name
+                    name = f"{stack[-1]}/end"
                 joints.append(_Joint(name, parent, np.zeros(3), []))
                 stack.append(name)
             elif word == "OFFSET":
@@ -207,6 +218,8 @@ def read_bvh(path: str | Path) -> tuple[dict[str, np.ndarray], float]:
             elif word == "}":
                 stack.pop()
         timing = re.match(r"\s*Frames:\s*(\d+)\s*Frame Time:\s*(\S+)", data)
+        if timing is None:
+            raise ValueError("no lines Frames and Frame Time after MOTION")
         frames = int(timing[1])
         step = float(timing[2])
         values = np.array(re.sub(r"#.*", "", data[timing.end() :]).split(), float)
@@ -224,8 +237,10 @@ def _followed(joints: list[_Joint], values: np.ndarray) -> dict[str, np.ndarray]
     """Return the positions (F, 3) of joints, parents first, from their channels (F, C)."""
     twice = len({joint.name for joint in joints}) < len(joints)
     numbers = len(joints) * len(values) * 9  # a rotation (3, 3) of each joint in each frame
-    if twice or numbers > MOST_NUMBERS:
-        raise ValueError("a joint that stands twice, or too many frames")
+    # Ends of chains have no numbers of their own in the file.
+    most = min(MOST_NUMBERS, max(FREE_NUMBERS, MOST_EXPANSION * values.size))
+    if twice or numbers > most:
+        raise ValueError("a joint that stands twice, or too many joints and frames")
     positions: dict[str, np.ndarray] = {}
     turns: dict[str, np.ndarray] = {}
     column = 0
@@ -240,8 +255,11 @@ def _followed(joints: list[_Joint], values: np.ndarray) -> dict[str, np.ndarray]
             else:
                 turn = portable.product(turn, rotation(axis, np.radians(values[:, column])))
             column += 1
-        above = turns[parent] if parent else np.eye(3)
-        start = positions[parent] if parent else 0.0
+        above = np.eye(3)
+        start = np.zeros(3)
+        if parent:
+            above = turns[parent]
+            start = positions[parent]
         positions[name] = portable.applied(above, shift) + start
         turns[name] = portable.product(above, turn)
     return positions

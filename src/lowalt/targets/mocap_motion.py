@@ -1,5 +1,6 @@
-"""The motion of a recording: angles turn the bones of the skeleton, and the stretch whose end is
-most like its start is found and closed to a cycle without a jump.
+"""The motion of a recording: angles turn the bones of the skeleton, and one cycle is closed.
+
+The stretch whose end is most like its start is found and closed to a cycle without a jump.
 
 Axes of the result: x right, y front, z up, metres. The files themselves are read in `mocap_files`.
 """
@@ -20,8 +21,9 @@ FROM_FILE = np.array([[-1.0, 0, 0], [0, 0, 1], [0, 1, 0]])
 """File axes (x left, y up, z front) to ours (x right, y front, z up): a proper rotation."""
 
 FADE_S = 0.15
-"""Length of the cross-fade that closes a cycle: about a quarter of a step, at most a sixth of the
-recording.
+"""Length of the cross-fade that closes a cycle.
+
+It is about a quarter of a step, at most a sixth of the recording.
 """
 
 SHORTEST_S = 0.5
@@ -32,11 +34,15 @@ SHORTEST_GAIT_S = 0.3
 """Shortest cycle that is accepted in a short recording: half of the shortest stride."""
 
 WALK_RATIO_S = (0.29, 0.62)
-"""Step length (m) times the time of a step (s), of a person of USUAL_M: adults have 0.38 at every
-speed of walking and runners 0.4 to 0.55; a rate that is wrong by two doubles or halves it. Source:
-Sekiya and Nagasaki, Gait and Posture 7 (1998); our own limits around CMU's walks and runs, which
-have 0.34 to 0.52."""
+"""Step length (m) times the time of a step (s), of a person of USUAL_M.
+
+Adults have 0.38 at every speed of walking and runners 0.4 to 0.55; a rate that is wrong by two
+doubles or halves it. Source: Sekiya and Nagasaki, Gait and Posture 7 (1998); our own limits around
+CMU's walks and runs, which have 0.34 to 0.52.
+"""
 USUAL_M = 1.75
+ALIKE = 1.5
+"""Cycles whose mismatch is at most this many times the least one count as equally good."""
 
 BLOCK = 256
 """Number of starts of a cycle that are compared with all ends in one matrix product."""
@@ -46,8 +52,8 @@ BLOCK = 256
 class Motion:
     """A recording in our axes.
 
-    root_m: (F, 3) places of the root; turned: (F, 31, 3, 3) global rotations of the bones; bones_m:
-    (31, 3) bones before they are turned; rate_hz: frames per second.
+    root_m: (F, 3) positions of the root; turned: (F, 31, 3, 3) global rotations of the bones;
+    bones_m: (31, 3) bones before they are turned; rate_hz: frames per second.
     """
 
     root_m: np.ndarray
@@ -57,8 +63,9 @@ class Motion:
 
 
 def _euler(angles_rad: np.ndarray) -> np.ndarray:
-    """Return rotations (..., 3, 3) for angles (..., 3): about x first, then y, then z (ASF's order
-    XYZ).
+    """Return rotations (..., 3, 3) for angles (..., 3).
+
+    They turn about x first, then y, then z (ASF's order XYZ).
     """
     x, y, z = np.moveaxis(np.asarray(angles_rad, float), -1, 0)
     return product(product(rotation("z", z), rotation("y", y)), rotation("x", x))
@@ -80,7 +87,9 @@ def posed(skeleton: Skeleton, channels: dict[str, np.ndarray], rate_hz: float) -
                 angles[:, "xyz".index(dof[1])] = np.radians(channels[name][:, column])
         frame = _euler(skeleton.axes_rad[index])
         local = product(product(frame, _euler(angles)), frame.T)
-        turned[:, index] = local if index == 0 else product(turned[:, PARENTS[index]], local)
+        turned[:, index] = local
+        if index > 0:
+            turned[:, index] = product(turned[:, PARENTS[index]], local)
     order = [skeleton.dofs["root"].index(name) for name in ("tx", "ty", "tz")]
     root = applied(FROM_FILE, channels["root"][:, order] * skeleton.unit_m)
     # With P = FROM_FILE, a rotation R becomes P R P^T in our axes and a bone b becomes P b.
@@ -94,8 +103,10 @@ def nodes_m(motion: Motion) -> np.ndarray:
 
 
 def front(motion: Motion, direction: np.ndarray) -> Motion:
-    """Return the motion turned about the vertical so that the horizontal `direction` (2,) becomes
-    +y, and moved so that the root's mean is the origin."""
+    """Return the motion turned about the vertical so that `direction` (2,) becomes +y.
+
+    direction: horizontal. The motion is moved so that the root's mean is the origin.
+    """
     sine, cosine = direction / portable.norm(direction)
     spin = np.array([[cosine, -sine, 0], [sine, cosine, 0], [0, 0, 1]])
     root = applied(spin, motion.root_m)
@@ -107,8 +118,9 @@ def front(motion: Motion, direction: np.ndarray) -> Motion:
 def refuse_glitches(
     positions: np.ndarray, rate_hz: float, limit_mps2: float, where: str, first: int
 ) -> None:
-    """Raise InputError naming `where` and the frame if a node accelerates by more than
-    `limit_mps2`.
+    """Raise InputError naming `where` and the frame if a node accelerates by too much.
+
+    limit_mps2: the largest acceleration.
 
     `positions` (F, 31, 3) metres, the first of them frame number `first`.
     """
@@ -123,8 +135,9 @@ def refuse_glitches(
 
 
 def refuse_short(frames: int, rate_hz: float, where: str) -> None:
-    """Raise InputError naming `where` if the recording is shorter than two cycles of
-    SHORTEST_GAIT_S.
+    """Raise InputError naming `where` if the recording is shorter than two shortest cycles.
+
+    A cycle takes at least SHORTEST_GAIT_S.
 
     In a short recording `find_cycle` looks for cycles of half its length and longer.
     """
@@ -139,8 +152,9 @@ def refuse_short(frames: int, rate_hz: float, where: str) -> None:
 def refuse_strange_rate(
     track: np.ndarray, rate_hz: float, speed_mps: float, stature: float, where: str
 ) -> None:
-    """Raise InputError naming `where` if the steps of a closed cycle are too quick or too slow for
-    their length.
+    """Raise InputError naming `where` if the steps of a closed cycle do not fit their length.
+
+    They may be too quick or too slow for it.
 
     track: (F, 31, 3) m, front +y; stature: of the person, in m. Nothing is said of a cycle whose
     feet do not swing.
@@ -151,8 +165,9 @@ def refuse_strange_rate(
         return
     step_s = len(track) / rate_hz / int(swing[1:].argmax() + 1) / 2
     ratio = speed_mps * step_s**2 * USUAL_M / stature
-    if not WALK_RATIO_S[0] <= ratio <= WALK_RATIO_S[1]:
-        other = rate_hz / 2 if ratio < WALK_RATIO_S[0] else rate_hz * 2
+    least, most = WALK_RATIO_S
+    if not least <= ratio <= most:
+        other = rate_hz / 2 if ratio < least else rate_hz * 2
         raise InputError(
             f"{where}: at {rate_hz:g} frames per second it moves {speed_mps:.2f} m/s with "
             f"{1 / step_s:.2g} steps per second, unlike a person; is it of {other:g}? Write the "
@@ -161,14 +176,15 @@ def refuse_strange_rate(
 
 
 def find_cycle(motion: Motion) -> tuple[int, int, int, float]:
-    """Return (start, end, fade, mismatch) of the cycle start..end-1 that closes best, in frames and
-    metres.
+    """Return (start, end, fade, mismatch) of the cycle start..end-1 that closes best.
 
-    The mismatch of two frames is a root mean square over the nodes: of the difference in place, and
-    of the difference in velocity times the fade's length. It leaves out the horizontal motion of
-    the root. Among the cycles whose mismatch is at most 1.5 times the least, the longest is taken,
-    for variety. A cycle must move at least half as fast as the fastest one, so that standing is no
-    cycle. At least `fade` frames follow its end.
+    They are in frames and metres.
+
+    The mismatch of two frames is a root mean square over the nodes: of the difference in position,
+    and of the difference in velocity times the fade's length. It leaves out the horizontal motion
+    of the root. Among the cycles whose mismatch is at most 1.5 times the least, the longest is
+    taken, for variety. A cycle must move at least half as fast as the fastest one, so that standing
+    is no cycle. At least `fade` frames follow its end.
     """
     frames = len(motion.root_m)
     fade = max(1, min(round(FADE_S * motion.rate_hz), frames // 6))
@@ -177,48 +193,50 @@ def find_cycle(motion: Motion) -> tuple[int, int, int, float]:
     positions[..., :2] -= positions[:, :1, :2]
     velocity = np.gradient(positions, axis=0) * fade
     state = np.concatenate([positions, velocity], axis=1).reshape(frames, -1)
-    place = motion.root_m[:, :2]
+    root = motion.root_m[:, :2]
     square = portable.dot(state, state)
     # Only pairs (start, end) of a few starts at a time: all pairs of a long recording would take
     # gigabytes.
     blocks = [np.arange(first, min(first + BLOCK, frames)) for first in range(0, frames, BLOCK)]
-    fastest = max(_speeds(place, starts, shortest, fade).max() for starts in blocks)
+    fastest = max(_speeds(root, starts, shortest, fade).max() for starts in blocks)
     least = np.inf
     candidates = []
     for starts in blocks:
         distance = square[starts, None] + square - 2 * product(state[starts], state.T)
         distance = np.sqrt(np.maximum(distance, 0) / len(NODES))
-        distance[_speeds(place, starts, shortest, fade) < max(fastest / 2, 0.0)] = np.inf
+        slow = _speeds(root, starts, shortest, fade) < max(fastest / 2, 0.0)
+        distance[slow] = np.inf
         least = min(least, float(distance.min()))
-        row, end = np.nonzero(distance <= 1.5 * least)
+        row, end = np.nonzero(distance <= ALIKE * least)
         candidates.append(np.stack([starts[row], end, distance[row, end]], axis=1))
     start, end, distance = np.concatenate(candidates).T
-    good = distance <= 1.5 * least
+    good = distance <= ALIKE * least
     longest = (end - start)[good].max()
-    best = np.flatnonzero(good & (end - start == longest))
-    best = best[np.argmin(distance[best])]
-    start = int(start[best])
-    end = int(end[best])
-    return start, end, fade, float(portable.norm(state[start] - state[end]) / np.sqrt(len(NODES)))
+    candidates_left = np.flatnonzero(good & (end - start == longest))
+    best = candidates_left[np.argmin(distance[candidates_left])]
+    first = int(start[best])
+    last = int(end[best])
+    mismatch = float(portable.norm(state[first] - state[last]) / np.sqrt(len(NODES)))
+    return first, last, fade, mismatch
 
 
-def _speeds(place: np.ndarray, starts: np.ndarray, shortest: int, fade: int) -> np.ndarray:
+def _speeds(root: np.ndarray, starts: np.ndarray, shortest: int, fade: int) -> np.ndarray:
     """Return the horizontal speed (S, F) in metres a frame from each start to each end.
 
     The value is -1 where the two are no cycle: fewer than `shortest` frames lie between them, or
-    fewer than `fade` frames follow the end.
+    fewer than `fade` frames follow the end. root: (F, 2) m.
     """
-    ends = np.arange(len(place))[None]
+    ends = np.arange(len(root))[None]
     length = ends - starts[:, None]
-    way = portable.norm(place[None] - place[starts, None])
-    return np.where(
-        (length >= shortest) & (ends + fade <= len(place)), way / np.maximum(length, 1), -1.0
-    )
+    way = portable.norm(root[None] - root[starts, None])
+    is_cycle = (length >= shortest) & (ends + fade <= len(root))
+    return np.where(is_cycle, way / np.maximum(length, 1), -1.0)
 
 
 def closed(motion: Motion, start: int, end: int, fade: int) -> tuple[Motion, np.ndarray]:
-    """Return the cycle start..end-1, closed in place and velocity, and the drift (2,) in m/s taken
-    out of it.
+    """Return the cycle start..end-1, closed in position and velocity, and its drift (2,) in m/s.
+
+    The drift is taken out of the cycle.
 
     The root's uniform horizontal drift over the cycle is taken out; its bob and sway stay. The
     first `fade` frames of the cycle are blended with the frames that follow its end, by weights w
@@ -229,11 +247,12 @@ def closed(motion: Motion, start: int, end: int, fade: int) -> tuple[Motion, np.
     drift = (motion.root_m[end] - motion.root_m[start]) / count * [1, 1, 0]
     root = motion.root_m - np.arange(-start, len(motion.root_m) - start)[:, None] * drift
     turned = motion.turned[start:end].copy()
-    place = np.arange(fade) / fade
-    weight = place**2 * (3 - 2 * place)
+    along = np.arange(fade) / fade
+    weight = along**2 * (3 - 2 * along)
     after = slice(end, end + fade)
     looped = root[start:end].copy()
-    looped[:fade] = weight[:, None] * looped[:fade] + (1 - weight[:, None]) * root[after]
+    share = weight[:, None]
+    looped[:fade] = share * looped[:fade] + (1 - share) * root[after]
     weight = weight[:, None, None, None]
     turned[:fade] = nearest_rotations(weight * turned[:fade] + (1 - weight) * motion.turned[after])
     return Motion(looped, turned, motion.bones_m, motion.rate_hz), drift[:2] * motion.rate_hz

@@ -1,5 +1,6 @@
-"""Command line of an extra product of the stage: a target's opaque surfaces, for scenes with
-self-occlusion.
+"""Command line of an extra product of the stage: a target's opaque surfaces.
+
+It is for scenes with self-occlusion.
 
 A target with a surface is stored as triangles, whose vertices move with their part. A recording has
 nodes without surfaces, so it is stored as capsules along its bones. Built-in shapes keep all their
@@ -26,10 +27,13 @@ from lowalt.targets.skeleton import NODES, PARENTS
 from lowalt.targets.surfaces import GRAIN, Surface, inside, longest_edge, merged, quartered
 
 ARRAYS = ("vertices", "vertex_part", "faces", "offset_m", "closed", "bones", "radius_m")
-"""vertices (V, 3) m in the cloud's axes; vertex_part (V,); faces (F, 3) numbers of vertices;
-offset_m (L,) m, distance from each of the cloud's points at which its line of sight starts; closed
-(P,) bool, whether a part's surface is closed; bones (B, 2) nodes at the ends of capsules; radius_m
-(B,) m."""
+"""Names of the arrays of a file of occluders.
+
+vertices (V, 3) m in the cloud's axes; vertex_part (V,); faces (F, 3) numbers of vertices; offset_m
+(L,) m, distance from each of the cloud's points at which its line of sight starts; closed (P,)
+bool, whether a part's surface is closed; bones (B, 2) nodes at the ends of capsules; radius_m (B,)
+m.
+"""
 
 STATURE_M = 1.756
 RADII_M = {
@@ -52,14 +56,17 @@ RADII_M = {
     "fingers": 0.02,
     "thumb": 0.015,
 }
-"""Radius of the limb round each bone of a person of STATURE_M, from girths and breadths of Gordon
-et al. 2014, 2012 Anthropometric Survey of U.S. Army Personnel, men's means, rounded; torso: mean of
-half breadth and half depth."""
+"""Radius of the limb round each bone of a person of STATURE_M.
+
+They are from girths and breadths of Gordon et al. 2014, 2012 Anthropometric Survey of U.S. Army
+Personnel, men's means, rounded; torso: mean of half breadth and half depth.
+"""
 
 
 def cut_away(surface: Surface, cuts: tuple[Surface, ...]) -> Surface:
-    """Return a surface without its triangles inside the convex `cuts`, divided finely along their
-    borders.
+    """Return a surface without its triangles inside the convex `cuts`.
+
+    Triangles are divided finely along the borders of the cuts.
     """
     corners = surface.vertices[surface.faces]
     grain = np.ptp(surface.vertices, axis=0).max() / GRAIN
@@ -83,8 +90,9 @@ def cut_away(surface: Surface, cuts: tuple[Surface, ...]) -> Surface:
 
 
 def part_surface(part: Part) -> Surface:
-    """Return a built-in part's whole surface: all its shells without its cuts, and their copies
-    around the hinge.
+    """Return a built-in part's whole surface.
+
+    It consists of all its shells without its cuts, and their copies around the hinge.
     """
     shells = merged(part.shells)
     if part.cuts:
@@ -100,18 +108,18 @@ def part_surface(part: Part) -> Surface:
 def from_surfaces(
     surfaces: list[Surface], offset_m: np.ndarray, closed: np.ndarray
 ) -> dict[str, np.ndarray]:
-    """Return the arrays of one surface a part, in the cloud's order of parts; offset_m: (L,) m;
-    closed: (P,).
-    """
+    """Return the arrays of one surface a part, in the cloud's order of parts."""
     whole = merged(surfaces)
     owner = np.repeat(np.arange(len(surfaces)), [len(surface.vertices) for surface in surfaces])
     arrays = (whole.vertices, owner, whole.faces.astype(np.int64), offset_m, closed)
-    return dict(zip(ARRAYS, (*arrays, np.zeros((0, 2), np.int64), np.zeros(0)), strict=True))
+    no_limbs = (np.zeros((0, 2), np.int64), np.zeros(0))
+    return dict(zip(ARRAYS, arrays + no_limbs, strict=True))
 
 
 def from_bones(stature_m: float) -> dict[str, np.ndarray]:
-    """Return the arrays of a pedestrian's capsules: one along each bone, its radius scaled with the
-    stature.
+    """Return the arrays of a pedestrian's capsules: one along each bone.
+
+    Its radius is scaled with the stature.
     """
     nodes = range(1, len(NODES))
     radii = [RADII_M[name] if name in RADII_M else RADII_M[name[1:]] for name in NODES[1:]]
@@ -130,8 +138,9 @@ def from_bones(stature_m: float) -> dict[str, np.ndarray]:
 
 
 def make(record: dict, inputs: Path | None, seed: int) -> dict[str, np.ndarray]:
-    """Return the arrays of a merged record's target; equal record, files and seed give equal
-    arrays.
+    """Return the arrays of a merged record's target.
+
+    Equal record, files and seed give equal arrays.
 
     Raises: InputError where the record or an input is wrong, or a folder is needed and none is
     given.
@@ -156,6 +165,7 @@ def make(record: dict, inputs: Path | None, seed: int) -> dict[str, np.ndarray]:
     if source in ("gait", "mocap"):
         return from_bones(float(record.get("stature_m", record["published"]["hgt_m"])))
     refuse_source(record, inputs)
+    assert inputs is not None  # a record of a mesh is refused without
     from lowalt.targets.occluders_mesh import mesh_surfaces
 
     return from_surfaces(*mesh_surfaces(record, Path(inputs), seed))

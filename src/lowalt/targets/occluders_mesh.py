@@ -1,5 +1,6 @@
-"""The surfaces of a user's mesh, part by part, as its cloud has them: cut, turned, scaled and
-simplified.
+"""The surfaces of a user's mesh, part by part, as its cloud has them.
+
+They are cut, turned, scaled and simplified.
 
 The cloud's own steps cut the mesh; where they take a part's samples, here they take its triangles.
 """
@@ -20,8 +21,9 @@ TRIANGLES = 1500
 
 
 def _pool(mesh: Mesh, regions: list[dict]) -> Pool:
-    """Return a mesh as a pool of one sample per triangle, at its centre; its corners (F, 9) take
-    the place of normals.
+    """Return a mesh as a pool of one sample per triangle, at its centre.
+
+    The triangle's corners (F, 9) take the place of normals.
 
     Large triangles are divided first where `regions` cut through them, so that their middles say
     where they are.
@@ -32,11 +34,13 @@ def _pool(mesh: Mesh, regions: list[dict]) -> Pool:
     for region in regions:
         while True:
             within = inside(corners.reshape(-1, 3), region).reshape(-1, 3)
-            long = (longest_edge(corners) > grain) & (within.any(axis=1) & ~within.all(axis=1))
-            if not long.any():
+            crossing = within.any(axis=1) & ~within.all(axis=1)
+            divided = (longest_edge(corners) > grain) & crossing
+            if not divided.any():
                 break
-            corners = np.concatenate([corners[~long], quartered(corners[long])])
-            component = np.concatenate([component[~long], np.tile(component[long], 4)])
+            kept = ~divided
+            corners = np.concatenate([corners[kept], quartered(corners[divided])])
+            component = np.concatenate([component[kept], np.tile(component[divided], 4)])
     return Pool(corners.mean(axis=1), corners.reshape(-1, 9), component, 0, 1.0)
 
 
@@ -48,25 +52,35 @@ def _wheel(diameter: float, width: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _triangles(record: dict, inputs: Path) -> dict[str, np.ndarray]:
-    """Triangles (F, 3, 3) of every part in body axes and the mesh's own size; a triangle goes where
-    its middle is.
+    """Triangles (F, 3, 3) of every part in body axes and the mesh's own size.
+
+    A triangle goes where its middle is.
     """
     frame = body_axes(record["front"], record["up"])
     parts = record["parts"]
     regions = [part["region"] for part in parts.values() if "region" in part] + record["drop"]
     cutting = [region for region in regions if not region.get("whole")]
-    cut, _ = cut_parts(
-        record, inputs, frame, lambda mesh, is_body: _pool(mesh, cutting if is_body else []), _wheel
-    )
-    return {
-        name: (pool.points if "wheel" in parts[name] else pool.normals).reshape(-1, 3, 3) @ frame.T
-        for name, pool in cut.items()
-    }
+
+    def of_file(mesh: Mesh, is_body: bool) -> Pool:
+        """The pool of a mesh; regions cut through the body's alone."""
+        if is_body:
+            return _pool(mesh, cutting)
+        return _pool(mesh, [])
+
+    cut, _ = cut_parts(record, inputs, frame, of_file, _wheel)
+    result = {}
+    for name, pool in cut.items():
+        corners = pool.normals
+        if "wheel" in parts[name]:
+            corners = pool.points
+        result[name] = corners.reshape(-1, 3, 3) @ frame.T
+    return result
 
 
 def simplified(triangles: np.ndarray, most: int) -> Surface:
-    """Return triangles (F, 3, 3) as a surface of at most about `most`, by quadric edge collapse
-    (Garland 1997).
+    """Return triangles (F, 3, 3) as a surface of at most about `most`.
+
+    This is quadric edge collapse (Garland 1997).
     """
     vertices, index = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
     faces = index.reshape(-1, 3)
@@ -97,8 +111,9 @@ def deviation_m(surface: Surface, points: np.ndarray) -> np.ndarray:
 def mesh_surfaces(
     record: dict, inputs: Path, seed: int
 ) -> tuple[list[Surface], np.ndarray, np.ndarray]:
-    """Return one surface a part in the cloud's axes, how far (L,) m each point lies off, and that
-    none is closed.
+    """Return one surface a part in the cloud's axes, each point's distance (L,) m, and closedness.
+
+    No surface is closed.
 
     `record` is a merged record that `mesh_record.check_record` has passed.
     Raises: InputError naming the file or the part and the reason.

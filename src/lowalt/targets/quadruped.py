@@ -28,8 +28,9 @@ LIFT = 0.16
 
 
 def stride_hz(mass_kg: float, speed_mps: float) -> float:
-    """Return the stride rate of a trot: that at the change to a gallop, times the root of the share
-    of its speed.
+    """Return the stride rate (Hz) of a trot.
+
+    It is the rate at the change to a gallop, times the root of the share of its speed.
 
     Source: the module's; the root is an estimate between a fixed rate and a fixed stride.
     """
@@ -38,8 +39,9 @@ def stride_hz(mass_kg: float, speed_mps: float) -> float:
 
 
 def _foot(phase: np.ndarray, stride_m: float, lift_m: float) -> np.ndarray:
-    """A foot's path (F, 3) about the place below its joint: back at the ground's speed, then
-    forward in the air.
+    """A foot's path (F, 3) about the point below its joint.
+
+    It goes back at the ground's speed, then forward in the air.
     """
     at = phase % 1.0
     half = STANCE * stride_m / 2

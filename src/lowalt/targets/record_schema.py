@@ -10,8 +10,10 @@ PATH = Path(__file__).with_name("records.schema.yaml")
 COMMON = "every record"
 """Section of the keys that records of all sources have."""
 FORBIDDEN = "{}\\"
-"""Characters that a file's name must not have: Snakemake takes braces for a wildcard, and a
-backslash is a folder on Windows only."""
+"""Characters that a file's name must not have.
+
+Snakemake takes braces for a wildcard, and a backslash is a folder on Windows only.
+"""
 
 
 @functools.cache
@@ -49,6 +51,11 @@ def figures(model: str) -> dict[str, str]:
         # A word names a set of figures that several models share.
         result |= schema()["figures"][item] if isinstance(item, str) else item
     return result
+
+
+def figures_si(record: dict) -> dict[str, float]:
+    """Return the figures of a merged built-in record by name, in SI units."""
+    return {name: figure["si"] for name, figure in record["figures"].items()}
 
 
 def record_files(record: dict) -> list[str]:

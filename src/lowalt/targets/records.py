@@ -10,7 +10,7 @@ by that source's own `check_record`.
 import math
 from pathlib import Path
 
-from lowalt.config.classes import AIRBORNE, classes_of, like
+from lowalt.config.classes import AIRBORNE, classes_of, like, refuse_subtype
 from lowalt.files.csv_tables import read_csv
 from lowalt.files.errors import InputError, reading
 from lowalt.files.yaml_files import load_yaml
@@ -25,8 +25,9 @@ _WORDS = ("category", "name", "unseen_protocol")
 _WHOLE = ("idx", "n_rotors_or_wings", "points_in_published_cloud_approx")
 AIR_SPEEDS = ("vx_abs_max", "vy_abs_max", "vz_abs_max")
 GROUND_SPEEDS = ("speed_lo", "speed_hi")
-"""Columns of speeds of targets in the air and on the ground; they may be 0: a craft hovers, a car
-stands.
+"""Columns of speeds of targets in the air and on the ground.
+
+They may be 0: a craft hovers, a car stands.
 """
 _NUMBERS = (
     "size_m",
@@ -43,8 +44,9 @@ COLUMNS = (*_WORDS, *_WHOLE, *_NUMBERS)
 
 
 def load_table(path: str | Path) -> dict[str, dict]:
-    """Return the published table by name, in its order: metres, hertz and m/s as numbers, empty
-    cells as None.
+    """Return the published table by name, in its order.
+
+    Metres, hertz and m/s are numbers, empty cells None.
 
     Raises: InputError naming the file, the subtype and the column that is missing, unknown or no
     positive number; a speed may be 0.
@@ -58,6 +60,7 @@ def load_table(path: str | Path) -> dict[str, dict]:
     for row in rows:
         name = row["name"]
         where = f"{path}: {row['name']}"
+        refuse_subtype(name, path)
         if name in table:
             raise InputError(f"{where}: named twice, expected one row per subtype")
         if row["unseen_protocol"] not in ("seen", "unseen"):
@@ -81,7 +84,8 @@ def _cell(where: str, column: str, text: str) -> str | int | float | None:
     except ValueError:
         value = math.nan
     may_be_zero = column in (*AIR_SPEEDS, *GROUND_SPEEDS)
-    if not (math.isfinite(value) and (value > 0 or (value == 0 and may_be_zero))):
+    good = value > 0 or (value == 0 and may_be_zero)
+    if not (good and math.isfinite(value)):
         least = "a number of at least 0" if may_be_zero else "a positive number"
         raise InputError(f"{where}: {column} is {text!r}, expected {least}")
     return value
@@ -102,8 +106,9 @@ def read_records(path: str | Path) -> dict[str, dict]:
 
 
 def records_of(targets: dict, inputs: str | Path | None = None) -> dict[str, dict]:
-    """Return the merged records of the block `targets` of a configuration: those of its `own` files
-    come last.
+    """Return the merged records of the block `targets` of a configuration.
+
+    Those of its `own` files come last.
 
     inputs: the folder of the user's files, in which a record's files must stand where
     `where_missing` is "builtin".
@@ -144,9 +149,8 @@ def load_records(
                     f"{path}: unknown subtype {name!r}, expected a key `row` or one of "
                     f"{list(table)}"
                 )
-            chosen.setdefault(name, []).append(
-                (where, {key: item for key, item in record.items() if key != "row"})
-            )
+            without_row = {key: item for key, item in record.items() if key != "row"}
+            chosen.setdefault(name, []).append((where, without_row))
     missing = [name for name in table if name not in chosen]
     if missing:
         raise InputError(
@@ -159,8 +163,9 @@ def load_records(
 def _last(
     row: dict, choices: list[tuple[str, dict]], inputs: str | Path | None, fall_back: bool
 ) -> dict:
-    """The last of a subtype's records, or with `fall_back` the last whose files are all in the
-    folder.
+    """The last of a subtype's records.
+
+    With `fall_back` it is the last one whose files are all in the folder.
     """
     where, record = choices[-1]
     merged = merge(row, record, where)
@@ -170,25 +175,27 @@ def _last(
 
 
 def with_row(row: dict | None, name: str, cells: object, where: str) -> dict:
-    """Return a row of the table of targets, None for a new one, with the cells of a record's key
-    `row` in it.
+    """Return a row of the table of targets with the cells of a record's key `row` in it.
+
+    row: None for a new one.
 
     Raises: InputError naming `where`, the column and the value that is missing, unknown or no
     positive number.
     """
+    refuse_subtype(name, where.rpartition(": ")[0] or where)
     known = [column for column in COLUMNS if column not in ("name", "idx")]
     if not isinstance(cells, dict) or set(cells) - set(known):
         raise InputError(f"{where}: row is {cells!r}, expected cells of the columns {known}")
-    changed = {
-        column: None if cell is None else _cell(f"{where}: row", column, str(cell))
-        for column, cell in cells.items()
-    }
     blank = dict.fromkeys(COLUMNS) | {
         "name": name,
         "unseen_protocol": "seen",
         "points_in_published_cloud_approx": 150,
     }
-    result = (row or blank) | changed
+    result = dict(row or blank)
+    for column, cell in cells.items():
+        result[column] = None
+        if cell is not None:
+            result[column] = _cell(f"{where}: row", column, str(cell))
     if not result["category"] or result["unseen_protocol"] not in ("seen", "unseen"):
         raise InputError(
             f"{where}: row is {cells!r}, expected a category and unseen_protocol seen or unseen"
@@ -226,9 +233,7 @@ def merge(row: dict, record: dict, where: str) -> dict:
 
 
 def _check_like(merged: dict, where: str) -> None:
-    """Refuse a record without a published class that it is like, or whose row lacks the speeds of
-    that class.
-    """
+    """Refuse a record that is like no published class, or whose row lacks that class's speeds."""
     try:
         kind = like(merged)
     except InputError as error:
@@ -241,19 +246,19 @@ def _check_like(merged: dict, where: str) -> None:
 
 
 def estimates(record: dict) -> tuple[int, int]:
-    """Return how many figures of a merged record, and cells of a row of its own, are estimates, and
-    how many there are.
+    """Return how many figures of a merged record are estimates, and how many there are.
+
+    Cells of a row of its own count, too.
 
     A cell that the record's `row_from` does not name is an estimate; the cells of a published row
     do not count.
     """
     row = record.get("published")
     named = record.get("row_from", {})
-    own_row = row is not None and row["idx"] is None
-    sources = [
-        named.get(column, "estimate") for column in _NUMBERS if own_row and row[column] is not None
-    ]
-    sources += [entry["source"] for entry in record.get("figures", {}).values()]
+    sources = [entry["source"] for entry in record.get("figures", {}).values()]
+    if row is not None and row["idx"] is None:
+        filled = [column for column in _NUMBERS if row[column] is not None]
+        sources += [named.get(column, "estimate") for column in filled]
     return sources.count("estimate"), len(sources)
 
 
@@ -263,7 +268,9 @@ def source_files(record: dict, inputs: str | Path | None) -> list[str]:
     Raises: InputError where the record names files and there is no folder.
     """
     names = record_files(record)
-    if names and inputs is None:
+    if not names:
+        return []
+    if inputs is None:
         raise InputError(
             f"{record['subtype']}: source {record['source']} reads {names}, expected a folder of "
             "inputs"
@@ -272,8 +279,10 @@ def source_files(record: dict, inputs: str | Path | None) -> list[str]:
 
 
 def missing_inputs(records: dict[str, dict], inputs: str | Path | None) -> list[str]:
-    """Return one line for each file that a record names and the folder `inputs` lacks: subtype,
-    source, path and where a user gets it."""
+    """Return one line for each file that a record names and the folder `inputs` lacks.
+
+    It says subtype, source, path and where a user gets the file.
+    """
     lines = []
     for name, record in records.items():
         for file in record_files(record):

@@ -1,5 +1,4 @@
-"""The 31 nodes of a pedestrian: their names, the parent of each, and forward kinematics; limbs
-whose feet are known.
+"""The 31 nodes of a pedestrian: their names, parents and forward kinematics; limbs to known feet.
 
 Shared by recordings (`mocap`) and the built-in gait (`gait`), so that both give the same cloud. A
 node is the far end of the bone that carries its name, as in the CMU skeleton files. `cyclist` and
@@ -91,7 +90,7 @@ def stature_m(offsets_m: np.ndarray) -> float:
     spine = sum(portable.norm(bone(name)) for name in _SPINE)
     legs = 0.0
     for side in "lr":
-        legs += sum(portable.norm(bone(side + name)) for name in _LEG)
+        legs += float(sum(portable.norm(bone(side + name)) for name in _LEG))
         legs -= sum(bone(side + name)[2] for name in ("hipjoint", "foot", "toes"))
     return float(spine + legs / 2)
 

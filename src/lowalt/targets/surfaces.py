@@ -1,5 +1,4 @@
-"""Triangle surfaces: closed ones from parametric primitives, whether points lie inside, and points
-spread on them.
+"""Triangle surfaces: closed ones from primitives, whether points lie inside, and points on them.
 
 This module is geometry only: it knows no target, part or record. Every primitive is one closed
 shell with outward normals (right-hand rule), in the caller's unit. Built-in models consist of
@@ -7,7 +6,7 @@ several shells, which may overlap. trimesh's sampler draws the faces independent
 drawn systematically, which halves the unevenness before thinning and spares the import.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Self
 
@@ -17,15 +16,17 @@ from lowalt.files.errors import InputError
 from lowalt.numerics import portable
 
 GRAIN = 30
-"""Triangles across the border of a cut are divided until their edges are shorter than the part's
-extent / GRAIN.
+"""Triangles across the border of a cut are divided.
+
+Their edges are then shorter than the part's extent / GRAIN.
 """
 
 
 @dataclass(frozen=True)
 class Surface:
-    """A triangle surface: `vertices` (V, 3) and `faces` (F, 3), indices in right-hand order seen
-    from outside.
+    """A triangle surface.
+
+    vertices: (V, 3); faces: (F, 3), indices in right-hand order seen from outside.
     """
 
     vertices: np.ndarray
@@ -36,12 +37,19 @@ class Surface:
         return replace(self, vertices=self.vertices + np.asarray(offset, float))
 
     def mapped(self, matrix: np.ndarray) -> Self:
-        """Return the surface under a linear map (3, 3); a mirroring map turns the faces, so normals
-        stay outward.
+        """Return the surface under a linear map (3, 3).
+
+        A mirroring map turns the faces, so that normals stay outward.
         """
         matrix = np.asarray(matrix, float)
-        faces = self.faces[:, ::-1] if np.linalg.det(matrix) < 0 else self.faces
-        return replace(self, vertices=portable.applied(matrix, self.vertices), faces=faces)
+        result = replace(self, vertices=portable.applied(matrix, self.vertices))
+        if np.linalg.det(matrix) < 0:
+            return result.flipped()
+        return result
+
+    def flipped(self) -> Self:
+        """Return the surface with its inside and outside exchanged."""
+        return replace(self, faces=self.faces[:, ::-1])
 
 
 def volume(surface: Surface) -> float:
@@ -52,10 +60,14 @@ def volume(surface: Surface) -> float:
 
 def merged(surfaces: Iterable[Surface]) -> Surface:
     """Return several surfaces as one list of triangles."""
-    surfaces = list(surfaces)
-    starts = np.cumsum([0] + [len(s.vertices) for s in surfaces[:-1]])
-    faces = [s.faces + start for s, start in zip(surfaces, starts, strict=True)]
-    return Surface(np.concatenate([s.vertices for s in surfaces]), np.concatenate(faces))
+    vertices = []
+    faces = []
+    start = 0
+    for surface in surfaces:
+        vertices.append(surface.vertices)
+        faces.append(surface.faces + start)
+        start += len(surface.vertices)
+    return Surface(np.concatenate(vertices), np.concatenate(faces))
 
 
 def inside(surface: Surface, points: np.ndarray) -> np.ndarray:
@@ -72,9 +84,13 @@ def inside(surface: Surface, points: np.ndarray) -> np.ndarray:
     # Blocks bound the memory of the points-by-triangles arrays.
     for block in np.array_split(near, len(near) * len(corners) // 30_000 + 1):
         a, b, c = np.moveaxis(corners[None] - points[block, None, None], 2, 0)
-        la, lb, lc = (portable.norm(v) for v in (a, b, c))
+        la = portable.norm(a)
+        lb = portable.norm(b)
+        lc = portable.norm(c)
+        ab = portable.dot(a, b)
+        bc = portable.dot(b, c)
+        ca = portable.dot(c, a)
         numerator = portable.dot(a, np.cross(b, c))
-        ab, bc, ca = (portable.dot(v, w) for v, w in ((a, b), (b, c), (c, a)))
         # The sum is 0 or 4 pi, so the last bits of the library's arc tangent cannot move it across
         # 2 pi.
         angle = 2 * np.arctan2(numerator, la * lb * lc + ab * lc + bc * la + ca * lb)
@@ -82,7 +98,7 @@ def inside(surface: Surface, points: np.ndarray) -> np.ndarray:
     return result
 
 
-def loft(sections: np.ndarray, tips: np.ndarray | None = None) -> Surface:
+def loft(sections: np.ndarray, tips: np.ndarray | Sequence | None = None) -> Surface:
     """Return the closed skin over sections (K, S, 3), each a loop of S points in the same sense.
 
     Each end is closed by a fan from `tips` (2, 3), by default the middle of the end section. The
@@ -90,7 +106,8 @@ def loft(sections: np.ndarray, tips: np.ndarray | None = None) -> Surface:
     """
     sections = np.asarray(sections, float)
     rows, sides, _ = sections.shape
-    tips = portable.mean(sections[[0, -1]], 1) if tips is None else np.asarray(tips, float)
+    if tips is None:
+        tips = portable.mean(sections[[0, -1]], 1)
     grid = np.arange(rows * sides).reshape(rows, sides)
     a = grid[:-1]
     b = np.roll(grid[:-1], -1, 1)
@@ -101,14 +118,25 @@ def loft(sections: np.ndarray, tips: np.ndarray | None = None) -> Surface:
     # The two halves of a loop are split along mirrored diagonals. Otherwise the upper and the lower
     # side of a twisted blade would cut through each other at its thin edge.
     half = np.arange(sides)[None, :, None] < sides // 2
+    abc = np.stack([a, b, c], -1)
+    abd = np.stack([a, b, d], -1)
+    acd = np.stack([a, c, d], -1)
+    bcd = np.stack([b, c, d], -1)
     faces = [
-        np.where(half, np.stack([a, b, c], -1), np.stack([a, b, d], -1)).reshape(-1, 3),
-        np.where(half, np.stack([a, c, d], -1), np.stack([b, c, d], -1)).reshape(-1, 3),
+        np.where(half, abc, abd).reshape(-1, 3),
+        np.where(half, acd, bcd).reshape(-1, 3),
         np.stack([np.full(sides, first), np.roll(grid[0], -1), grid[0]], -1),
         np.stack([np.full(sides, last), grid[-1], np.roll(grid[-1], -1)], -1),
     ]
-    surface = Surface(np.concatenate([sections.reshape(-1, 3), tips]), np.concatenate(faces))
-    return surface if volume(surface) > 0 else Surface(surface.vertices, surface.faces[:, ::-1])
+    vertices = np.concatenate([sections.reshape(-1, 3), np.asarray(tips, float)])
+    return _outward(Surface(vertices, np.concatenate(faces)))
+
+
+def _outward(surface: Surface) -> Surface:
+    """Return a closed surface with its normals outward."""
+    if volume(surface) > 0:
+        return surface
+    return surface.flipped()
 
 
 def superellipse(
@@ -118,8 +146,9 @@ def superellipse(
 
     n = 2 is an ellipse, a larger n a rounded rectangle.
     """
-    s, c = portable.sine_cosine_turns(np.arange(sides) / sides)
-    along, across = (np.sign(part) * portable.power(abs(part), 2 / exponent) for part in (c, s))
+    sine, cosine = portable.sine_cosine_turns(np.arange(sides) / sides)
+    along = np.sign(cosine) * portable.power(abs(cosine), 2 / exponent)
+    across = np.sign(sine) * portable.power(abs(sine), 2 / exponent)
     return np.stack([half_a * along, half_b * across], 1)
 
 
@@ -128,15 +157,17 @@ def ellipsoid(
 ) -> Surface:
     """Return an ellipsoid with the half axes `radii` (3,) about `centre` (3,)."""
     out, up = portable.sine_cosine_turns(np.arange(1, sides // 2) / (2 * (sides // 2)))
-    ring = np.stack(portable.sine_cosine_turns(np.arange(sides) / sides)[::-1], 1)
-    rings = np.concatenate(
-        [out[:, None, None] * ring, np.broadcast_to(up[:, None, None], (len(up), sides, 1))], 2
-    )
+    sine, cosine = portable.sine_cosine_turns(np.arange(sides) / sides)
+    level = out[:, None, None] * np.stack([cosine, sine], 1)
+    height = np.broadcast_to(up[:, None, None], (len(up), sides, 1))
+    rings = np.concatenate([level, height], 2)
     unit = loft(rings, tips=[[0, 0, 1], [0, 0, -1]])
     return unit.mapped(np.diag(np.asarray(radii, float))).moved(centre)
 
 
-def tube(path: np.ndarray, radii: np.ndarray | float, sides: int = 10) -> Surface:
+def tube(
+    path: np.ndarray | Sequence, radii: np.ndarray | Sequence | float, sides: int = 10
+) -> Surface:
     """Return a round tube along `path` (K, 3), a radius at each point, closed by flat ends."""
     path = np.asarray(path, float)
     radii = np.broadcast_to(np.asarray(radii, float), len(path))
@@ -169,13 +200,15 @@ def hull(
     the ends.
     """
     table = np.array(list(stations), float)
-    sections = []
+    loops = []
     for y, half_width, low, high in table:
         loop = superellipse(half_width, (high - low) / 2, exponent, sides)
-        sections.append(np.stack([loop[:, 0], np.full(sides, y), loop[:, 1] + (low + high) / 2], 1))
-    sections = np.array(sections)
+        height = loop[:, 1] + (low + high) / 2
+        loops.append(np.stack([loop[:, 0], np.full(sides, y), height], 1))
+    sections = np.array(loops)
     tips = portable.mean(sections[[0, -1]], 1)
-    tips[:, 1] += bow * np.array([-1, 1]) * np.sign(table[-1, 0] - table[0, 0])
+    sense = np.sign(table[-1, 0] - table[0, 0])
+    tips[:, 1] += bow * np.array([-1, 1]) * sense
     return loft(sections, tips)
 
 
@@ -201,37 +234,33 @@ def ring(profile: np.ndarray, sides: int = 32) -> Surface:
     right = np.roll(grid, -1, 0)
     up = np.roll(grid, -1, 1)
     both = np.roll(right, -1, 1)
-    faces = np.concatenate(
-        [np.stack([grid, right, both], -1), np.stack([grid, both, up], -1)]
-    ).reshape(-1, 3)
-    surface = Surface(vertices.reshape(-1, 3), faces)
-    return surface if volume(surface) > 0 else Surface(surface.vertices, faces[:, ::-1])
+    lower = np.stack([grid, right, both], -1)
+    upper = np.stack([grid, both, up], -1)
+    faces = np.concatenate([lower, upper]).reshape(-1, 3)
+    return _outward(Surface(vertices.reshape(-1, 3), faces))
 
 
 def airfoil(chord: float, thickness: float, panels: int = 6) -> np.ndarray:
-    """Return a symmetric section (2 panels + 1, 2) of (along chord, across), leading edge at
-    +chord/4, as a loop.
+    """Return a symmetric section (2 panels + 1, 2) of (along chord, across) as a loop.
 
-    `thickness` is the largest thickness over the chord. The blunt trailing edge has a fiftieth of
-    that thickness.
+    The leading edge is at +chord/4. `thickness` is the largest thickness over the chord. The blunt
+    trailing edge has a fiftieth of that thickness.
     Source: NACA four-digit thickness distribution, Abbott & von Doenhoff 1959.
     """
     x = (1 - portable.sine_cosine_turns(np.arange(panels + 1) / (2 * panels))[1]) / 2
-    y = (
-        5
-        * thickness
-        * (0.2969 * np.sqrt(x) + x * (-0.1260 + x * (-0.3516 + x * (0.2843 - 0.1015 * x))))
-    )
-    loop = np.concatenate([np.stack([x, y], 1), np.stack([x, -y], 1)[:0:-1]]) * chord
+    polynomial = x * (-0.1260 + x * (-0.3516 + x * (0.2843 - 0.1015 * x)))
+    y = 5 * thickness * (0.2969 * np.sqrt(x) + polynomial)
+    upper = np.stack([x, y], 1)
+    lower = np.stack([x, -y], 1)
+    loop = np.concatenate([upper, lower[:0:-1]]) * chord
     return np.stack([chord / 4 - loop[:, 0], loop[:, 1]], 1)
 
 
 def foil(stations: Iterable[tuple], thickness: float = 0.12) -> Surface:
-    """Return a wing or blade along +x from stations (x, y, z, chord, twist): airfoil sections,
-    closed ends.
+    """Return a wing or blade along +x from stations (x, y, z, chord, twist).
 
-    (x, y, z) is the quarter-chord point, the chord lies along y (leading edge at +y), a positive
-    twist (rad) raises the leading edge.
+    Sections are airfoils, and the ends are closed. (x, y, z) is the quarter-chord point, the chord
+    lies along y (leading edge at +y), a positive twist (rad) raises the leading edge.
     """
     sections = []
     for x, y, z, chord, twist in stations:
@@ -249,8 +278,9 @@ def longest_edge(corners: np.ndarray) -> np.ndarray:
 
 
 def quartered(corners: np.ndarray) -> np.ndarray:
-    """Return triangles (F, 3, 3) each divided into four at the middles of its edges, (4 F, 3, 3),
-    copies in turn.
+    """Return triangles (F, 3, 3) each divided into four at the middles of its edges.
+
+    The result (4 F, 3, 3) holds the copies in turn.
     """
     a, b, c = np.moveaxis(corners, 1, 0)
     ab = (a + b) / 2
@@ -261,8 +291,7 @@ def quartered(corners: np.ndarray) -> np.ndarray:
 
 
 def face_normals(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return each triangle's unit normal (F, 3), by the right-hand rule, and its area (F,) in
-    squared units.
+    """Return each triangle's unit normal (F, 3), by the right-hand rule, and its area (F,).
 
     `vertices` (V, 3), `faces` (F, 3) indices. A degenerate triangle has area 0 and a zero normal.
     """
@@ -276,40 +305,40 @@ def face_normals(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, n
 def sample_faces(
     vertices: np.ndarray, faces: np.ndarray, count: int, rng: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return `count` points (count, 3) spread over the triangles by area and the triangle (count,)
-    each lies on.
+    """Return `count` points (count, 3) spread over the triangles by area, and their triangles.
 
-    `vertices` (V, 3), `faces` (F, 3) indices, `rng` the only source of randomness. One point falls
-    into each of `count` equal slices of the running area, so a face of area a gets count * a /
-    total points to within two. Degenerate triangles get none.
+    The triangles (count,) are indices of faces. `vertices` (V, 3), `faces` (F, 3) indices, `rng`
+    the only source of randomness. One point falls into each of `count` equal slices of the running
+    area, so a face of area a gets count * a / total points to within two. Degenerate triangles get
+    none.
     Raises: InputError where the surface has no area or the area is not finite.
     Source: Osada et al. 2002 (uniform point in a triangle), systematic sampling over the faces.
     """
     _, areas = face_normals(vertices, faces)
     running = np.cumsum(areas)
-    total = running[-1] if len(running) else 0.0
+    total = 0.0
+    if len(running):
+        total = running[-1]
     if not (np.isfinite(total) and total > 0):
         raise InputError(
             f"surface of {len(areas)} triangles has area {total}, expected a positive finite one"
         )
-    where = (np.arange(count) + rng.random(count)) / count * total
+    area = (np.arange(count) + rng.random(count)) / count * total
     # side="right" passes over degenerate faces; the clip guards the last slice against rounding at
     # its end.
-    face = np.searchsorted(running, where, side="right").clip(max=np.flatnonzero(areas)[-1])
+    face = np.searchsorted(running, area, side="right").clip(max=np.flatnonzero(areas)[-1])
     corners = np.asarray(vertices, float)[np.asarray(faces)[face]]
     root = np.sqrt(rng.random(count))[:, None]
     along = rng.random(count)[:, None]
-    points = (1 - root) * corners[:, 0] + root * (
-        (1 - along) * corners[:, 1] + along * corners[:, 2]
-    )
+    on_edge = (1 - along) * corners[:, 1] + along * corners[:, 2]
+    points = (1 - root) * corners[:, 0] + root * on_edge
     return points, face
 
 
 def thin(
-    points: np.ndarray, count: int, rng: np.random.Generator, keep: np.ndarray | tuple = ()
+    points: np.ndarray, count: int, rng: np.random.Generator, keep: np.ndarray | Sequence = ()
 ) -> np.ndarray:
-    """Return the indices (count,) of `count` points spread as evenly as can be, in the order they
-    were chosen.
+    """Return the indices of `count` points spread as evenly as can be, in the order chosen.
 
     Farthest-point sampling: each next point is the one farthest from all chosen so far (lowest
     index on a tie), from a random first one. `points` (L, D); the indices in `keep` are chosen
@@ -319,18 +348,22 @@ def thin(
     Source: Eldar et al. 1997, "The farthest point strategy for progressive image sampling".
     """
     points = np.asarray(points, float)
-    keep = [int(index) for index in dict.fromkeys(np.asarray(keep, int).tolist())]
-    if not max(1, len(keep)) <= count <= len(points):
-        raise InputError(
-            f"thinning to {count} points, expected {max(1, len(keep))} to {len(points)}"
-        )
+    kept = list(dict.fromkeys(np.asarray(keep, int).tolist()))
+    fewest = max(1, len(kept))
+    if not fewest <= count <= len(points):
+        raise InputError(f"thinning to {count} points, expected {fewest} to {len(points)}")
     columns = np.ascontiguousarray(points.T)
     nearest = np.full(len(points), np.inf)
     chosen = np.empty(count, np.int64)
+    # Drawn even where points are kept, so that the draws that follow stay the same.
     first = int(rng.integers(len(points)))
     for step in range(count):
-        farthest = int(np.argmax(nearest)) if step else first
-        index = keep[step] if step < len(keep) else farthest
+        if step < len(kept):
+            index = kept[step]
+        elif step == 0:
+            index = first
+        else:
+            index = int(np.argmax(nearest))
         chosen[step] = index
         away = (columns[0] - columns[0, index]) ** 2
         for column in columns[1:]:

@@ -1,5 +1,4 @@
-"""Pieces that multirotor layouts share: where rotors stand, propellers, motors, fuselage, gimbal
-and skids.
+"""Pieces that multirotor layouts share: propellers, motors, fuselage, gimbal and skids.
 
 Axes: front +y, right +x, up +z, metres. `figure` is a record's figures in SI units by name.
 """
@@ -37,15 +36,15 @@ def hubs(record: dict, figure: dict) -> np.ndarray:
         front = np.array([1, 1, -1, -1]) / slant
         right = np.array([1, -1, -1, 1]) * ratio / slant
     else:
-        front, right = portable.sine_cosine_turns(
-            1 / 4 + (np.arange(count) - figure["hub_turn"]) / count
-        )
+        turns = 1 / 4 + (np.arange(count) - figure["hub_turn"]) / count
+        front, right = portable.sine_cosine_turns(turns)
     return reach * np.stack([right, front], 1)
 
 
 def blade(diameter: float, chord: float, sense: int) -> Surface:
-    """Return one propeller blade along +x, hub at the origin, for a rotor that turns anticlockwise
-    (`sense` 1, leading edge at +y) or clockwise (-1).
+    """Return one propeller blade along +x, hub at the origin.
+
+    sense: of the rotor, 1 anticlockwise (leading edge at +y), -1 clockwise.
 
     The twist follows a constant pitch of two thirds of the diameter; the chord is largest at 0.35
     of the radius.
@@ -54,10 +53,11 @@ def blade(diameter: float, chord: float, sense: int) -> Surface:
     stations = np.array([0.08, 0.2, 0.35, 0.55, 0.75, 0.92, 1.0])
     chords = chord * np.array([0.55, 0.85, 1.0, 0.88, 0.68, 0.5, 0.25])
     twist = portable.arctan(4 / 3 / (2 * np.pi * np.maximum(stations, 0.2)))
-    shell = foil(
-        [(x * radius, 0, 0, c, t) for x, c, t in zip(stations, chords, twist, strict=True)], 0.10
-    )
-    return shell if sense > 0 else shell.mapped(np.diag([1.0, -1.0, 1.0]))
+    rows = [(x * radius, 0, 0, c, t) for x, c, t in zip(stations, chords, twist, strict=True)]
+    shell = foil(rows, thickness=0.10)
+    if sense < 0:
+        return shell.mapped(np.diag([1.0, -1.0, 1.0]))
+    return shell
 
 
 def rotor(
@@ -80,8 +80,8 @@ def rotor(
     for depth, turn in layers:
         layer_sine, layer_cosine = portable.sine_cosine_turns(np.array(turn))
         # The sums of angles; each layer turns on from the one above it.
-        turned = sine * layer_cosine + cosine * layer_sine
-        cosine = cosine * layer_cosine - sine * layer_sine
+        turned = float(sine * layer_cosine + cosine * layer_sine)
+        cosine = float(cosine * layer_cosine - sine * layer_sine)
         sine = turned
         matrix = np.array([[cosine, -sine, 0], [sine, cosine, 0], [0, 0, 1]])
         shells.append(shell.mapped(matrix).moved(hub - [0, 0, depth]))
@@ -89,7 +89,7 @@ def rotor(
     return Part(name, "rotor", tuple(shells), tuple(hub), axis, copies=int(figure["blade_count"]))
 
 
-def rotors(places: np.ndarray, height: float, figure: dict, apart: bool = False) -> list[Part]:
+def rotors(axles: np.ndarray, height: float, figure: dict, apart: bool = False) -> list[Part]:
     """Return the rotors on the motor axes (R, 2) at `height`; neighbours turn in opposite senses.
 
     With a figure `layer_gap` each rotor has two layers of blades. apart: whether the lower layer is
@@ -97,10 +97,10 @@ def rotors(places: np.ndarray, height: float, figure: dict, apart: bool = False)
     """
     parts = []
     single = ((0.0, 0.0),)
-    layers = single
+    layers: tuple[tuple[float, float], ...] = single
     if "layer_gap" in figure and not apart:
         layers = (*single, (figure["layer_gap"], figure["layer_turn"]))
-    for index, (x, y) in enumerate(places):
+    for index, (x, y) in enumerate(axles):
         sense = 1 if index % 2 == 0 else -1
         parts.append(rotor(f"rotor {index + 1}", np.array([x, y, height]), sense, figure, layers))
         if apart:
@@ -109,11 +109,11 @@ def rotors(places: np.ndarray, height: float, figure: dict, apart: bool = False)
     return parts
 
 
-def motors(places: np.ndarray, top: float, figure: dict) -> list[Surface]:
+def motors(axles: np.ndarray, top: float, figure: dict) -> list[Surface]:
     """Return the motors as cylinders below the rotors (R, 2), their upper ends at `top` (m)."""
     low = top - figure["motor_height"]
     radius = figure["motor_diameter"] / 2
-    return [cylinder(radius, (x, y, low), (x, y, top)) for x, y in places]
+    return [cylinder(radius, (x, y, low), (x, y, top)) for x, y in axles]
 
 
 def fuselage(figure: dict, taper: float = 0.55) -> Surface:

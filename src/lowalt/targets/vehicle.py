@@ -1,5 +1,6 @@
-"""Built-in car models: a lower body and a greenhouse by the car's profile, and four turning wheels;
-a bus is one box.
+"""Built-in car models: a lower body, a greenhouse by the car's profile, and four turning wheels.
+
+A bus is one box.
 
 Axes: front +y, right +x, up +z, metres. The origin lies in the middle of length, width and height,
 so that it is half the height above the ground. Of the figures, heights are relative to the height;
@@ -14,6 +15,7 @@ import numpy as np
 
 from lowalt.numerics import portable
 from lowalt.targets.assemble import Part
+from lowalt.targets.record_schema import figures_si
 from lowalt.targets.surfaces import Surface, box, cylinder, hull, loft, ring, superellipse
 
 SPOKES = 5
@@ -24,7 +26,7 @@ HOOD_END = 0.18
 
 def fault(record: dict) -> str | None:
     """Return the reason why a merged record is no car, or None."""
-    f = {name: value["si"] for name, value in record["figures"].items()}
+    f = figures_si(record)
     table = record["published"]
     axle = f["front_overhang"] + f["wheel_base"]
     if axle >= table["len_m"]:
@@ -36,7 +38,9 @@ def fault(record: dict) -> str | None:
         return (
             f"figures.track is {f['track']:.4g} m, expected less than the {table['wid_m']} m width"
         )
-    return None if record["model"] == "bus" else _profile_fault(f, table)
+    if record["model"] == "bus":
+        return None
+    return _profile_fault(f, table)
 
 
 def _profile_fault(f: dict, table: dict) -> str | None:
@@ -64,13 +68,14 @@ def _lower(length: float, width: float, height: float, f: dict) -> Surface:
     """The body up to hood, belt and deck, as rounded sections along the car."""
     floor = -height / 2 + f["ground_clearance"]
     bottom = -height / 2
-    hood, belt, deck = (
-        bottom + f[name] * height for name in ("hood_height", "belt_height", "deck_height")
-    )
+    hood = bottom + f["hood_height"] * height
+    belt = bottom + f["belt_height"] * height
+    deck = bottom + f["deck_height"] * height
     nose = floor + 0.55 * (hood - floor)
     tail = floor + 0.35 * (deck - floor)
     half = width / 2
     lift = 0.06 * height
+    # Distance from the front, half width as shares of the car's; lower and upper edge (m).
     rows = [
         (0.0, 0.72, floor + lift, nose),
         (0.02, 0.86, floor + 0.5 * lift, 0.3 * nose + 0.7 * hood),
@@ -81,11 +86,8 @@ def _lower(length: float, width: float, height: float, f: dict) -> Surface:
         (0.97, 0.93, floor + 0.5 * lift, deck),
         (1.0, 0.82, floor + lift, max(tail, deck - 0.12 * height)),
     ]
-    return hull(
-        [(length * (0.5 - s), w * half, low, high) for s, w, low, high in rows],
-        exponent=4.5,
-        sides=32,
-    )
+    stations = [(length * (0.5 - s), w * half, low, high) for s, w, low, high in rows]
+    return hull(stations, exponent=4.5, sides=32)
 
 
 def _greenhouse(length: float, width: float, height: float, f: dict) -> Surface:
@@ -117,18 +119,20 @@ def _coach(length: float, width: float, height: float, f: dict) -> Surface:
         (-0.49, 1.0, floor, top),
         (-0.5, 0.95, floor + 0.05 * height, 0.96 * top),
     ]
-    return hull(
-        [(length * y, w * width / 2, low, high) for y, w, low, high in rows], exponent=7.0, sides=32
-    )
+    stations = [(length * y, w * width / 2, low, high) for y, w, low, high in rows]
+    return hull(stations, exponent=7.0, sides=32)
 
 
 def wheel(diameter: float, tyre_width: float) -> tuple[Surface, ...]:
-    """Return a wheel about the x axis at the origin, as closed shells: tyre, hub and spokes; its
-    lowest point is at z = -diameter / 2."""
+    """Return a wheel about the x axis at the origin, as closed shells: tyre, hub and spokes.
+
+    Its lowest point is at z = -diameter / 2.
+    """
     radius = diameter / 2
     half = tyre_width / 2
     inner = 0.62 * radius
-    loop = superellipse((radius - inner) / 2, half, 3.5, 16) + np.array([(radius + inner) / 2, 0])
+    section = superellipse((radius - inner) / 2, half, 3.5, 16)
+    loop = section + np.array([(radius + inner) / 2, 0])
     # `ring` turns about z. The map takes z to x, so that one section of the tyre points straight
     # down.
     to_x = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])
@@ -136,34 +140,36 @@ def wheel(diameter: float, tyre_width: float) -> tuple[Surface, ...]:
         ring(loop, 32).mapped(to_x),
         cylinder(0.16 * radius, (-0.5 * half, 0, 0), (0.6 * half, 0, 0)),
     ]
+    side = np.array([1.0, 0, 0])
+    section = superellipse(0.12 * radius, 0.2 * half, 4.0, 8)
     for k in range(SPOKES):
         sine, cosine = portable.sine_cosine_turns(k / SPOKES)
         out = np.array([0, cosine, sine])
         across = np.array([0, -sine, cosine])
-        side = np.array([1.0, 0, 0])
-        section = superellipse(0.12 * radius, 0.2 * half, 4.0, 8)
-        rows = [
-            out * r + 0.35 * half * side + section[:, :1] * across + section[:, 1:] * side
-            for r in (0.1 * radius, 1.04 * inner)
-        ]
-        shells.append(loft(np.array(rows)))
+        ends = []
+        for r in (0.1 * radius, 1.04 * inner):
+            middle = out * r + 0.35 * half * side
+            ends.append(middle + section[:, :1] * across + section[:, 1:] * side)
+        shells.append(loft(np.array(ends)))
     return tuple(shells)
 
 
 def parts(record: dict) -> tuple[list[Part], dict]:
-    """Return the parts of the car that a merged record describes, and the entries for its cloud's
-    record.
+    """Return the parts of the car that a merged record describes.
+
+    The entries for its cloud's record come second.
 
     The entries are `wheel_diameter_m`, which sets the wheels' rate, and `origin_height_m`, the
     height of the origin above the ground on which the wheels stand.
     """
-    f = {name: value["si"] for name, value in record["figures"].items()}
+    f = figures_si(record)
     table = record["published"]
     length = table["len_m"]
     width = table["wid_m"]
     height = table["hgt_m"]
-    rolling = record.get("wheel_size", "published") == "rolling"
-    diameter = f["rolling_diameter"] if rolling else table["wheel_diam_m"]
+    diameter = table["wheel_diam_m"]
+    if record.get("wheel_size", "published") == "rolling":
+        diameter = f["rolling_diameter"]
     front = length / 2 - f["front_overhang"]
     tyre = f["tyre_width"]
     # Wheels stay inside the body's width, flush with its sides where the track is wide.
@@ -175,26 +181,23 @@ def parts(record: dict) -> tuple[list[Part], dict]:
     for name, y in (("front", front), ("rear", front - f["wheel_base"])):
         for side, word in ((-1, "left"), (1, "right")):
             centre = (side * across, y, -height / 2 + diameter / 2)
-            turned = [shell if side > 0 else shell.mapped(mirror) for shell in shells]
-            wheels.append(
-                Part(
-                    f"{name} {word} wheel",
-                    "wheel",
-                    tuple(shell.moved(centre) for shell in turned),
-                    centre,
-                    (-1.0, 0.0, 0.0),
-                )
-            )
-            inside = side * (across - 0.6 * tyre)
-            outside = side * width
-            wells.append(
-                cylinder(0.56 * diameter, (inside, *centre[1:]), (outside, *centre[1:]), 24)
-            )
+            on_side = shells
+            if side < 0:
+                on_side = tuple(shell.mapped(mirror) for shell in shells)
+            placed = tuple(shell.moved(centre) for shell in on_side)
+            wheels.append(Part(f"{name} {word} wheel", "wheel", placed, centre, (-1.0, 0.0, 0.0)))
+            inside = (side * (across - 0.6 * tyre), *centre[1:])
+            outside = (side * width, *centre[1:])
+            wells.append(cylinder(0.56 * diameter, inside, outside, 24))
     # No station sees a car from below, so the underside between the sills gets no points.
     floor = f["ground_clearance"] + 0.06 * height
     wells.append(box((0.86 * width, 1.1 * length, 2 * floor), (0, 0, -height / 2)))
-    skins = (_lower, _greenhouse) if record["model"] == "car" else (_coach,)
-    body = Part(
-        "body", "body", tuple(skin(length, width, height, f) for skin in skins), cuts=tuple(wells)
-    )
+    if record["model"] == "car":
+        skins: tuple[Surface, ...] = (
+            _lower(length, width, height, f),
+            _greenhouse(length, width, height, f),
+        )
+    else:
+        skins = (_coach(length, width, height, f),)
+    body = Part("body", "body", skins, cuts=tuple(wells))
     return [body, *wheels], {"wheel_diameter_m": diameter, "origin_height_m": height / 2}

@@ -1,5 +1,6 @@
-"""`python -m lowalt.tiles`: renders the noisy signals of a chunk as encoded tiles and, optionally,
-reduced images.
+"""`python -m lowalt.tiles`: renders the noisy signals of a chunk as encoded tiles.
+
+It writes reduced images, too, where they are asked for.
 """
 
 import argparse
@@ -23,21 +24,19 @@ def encoded(
     late: Callable[[int], np.ndarray | None] = lambda model: None,
     cubes: Callable[[int, int, np.ndarray], list[Cube] | None] = lambda model, level, sample: None,
 ) -> Iterator[bytes]:
-    """Yield the PNG of every sample, model by model, SNR by SNR; `seen` is called with its number
-    and its tile.
+    """Yield the PNG of every sample, model by model, SNR by SNR.
 
-    late: how late a model's symbols are, cubes: those of a model at an SNR, both as in
-    `Renderer.tile`.
+    seen: called with a sample's number and its tile; late: how late a model's symbols are, cubes:
+    those of a model at an SNR, both as in `Renderer.tile`.
     """
     palette = tiles.images.palette
-    models = reported(signals, len(signals), "models")
-    samples = (
-        (place, level, one) for place, model in enumerate(models) for level, one in enumerate(model)
-    )
-    for number, (place, level, sample) in enumerate(samples):
-        tile = tiles.tile(sample, late=late(place), cubes=cubes(place, level, sample))
-        seen(number, tile)
-        yield encode(tile, palette)
+    number = 0
+    for model, of_model in enumerate(reported(signals, len(signals), "models")):
+        for level, sample in enumerate(of_model):
+            tile = tiles.tile(sample, late=late(model), cubes=cubes(model, level, sample))
+            seen(number, tile)
+            number += 1
+            yield encode(tile, palette)
 
 
 def main(arguments: list[str]) -> None:
@@ -61,38 +60,39 @@ def main(arguments: list[str]) -> None:
     drawn = options.settings.pop("drawn", None)
     seen_in = options.settings.pop("cubes", None)
     tiles = Renderer.from_settings(options.settings)
-    late = (
-        _late(options.settings["spectra"], drawn, tiles, options.motion)
-        if drawn
-        else lambda model: None
-    )
-    more = {"cubes": _cubes(seen_in, tiles, options)} if seen_in else {}
+    more: dict = {}
+    if drawn:
+        more["late"] = _late(options.settings["spectra"], drawn, tiles, options.motion)
+    if seen_in:
+        more["cubes"] = _cubes(seen_in, tiles, options)
     signals = load_signals(options.signals, tiles.network)
+    models, snrs, stations, _ = signals.shape
     targets = [reduced.target(text) for text in options.reduced]
-    with reduced.writing(
-        targets, len(signals) * signals.shape[1], signals.shape[2], len(tiles.spectra)
-    ) as seen:
-        tile_files.write(options.out, encoded(signals, tiles, seen, late, **more))
+    with reduced.writing(targets, models * snrs, stations, len(tiles.spectra)) as seen:
+        tile_files.write(options.out, encoded(signals, tiles, seen, **more))
 
 
 def _late(
     spectra: dict, drawn: dict, tiles: Renderer, motion: str
 ) -> Callable[[int], np.ndarray | None]:
-    """Delays of the symbols of a chunk's models; drawn: {seed, effects}, from which the scene draws
-    them.
+    """Return a function that gives the delays of a model's symbols.
+
+    drawn: {seed, effects}, from which the scene draws them.
     """
     from lowalt.motion import read_table
     from lowalt.scene.lateness import lateness
 
-    rows, (seed, effects) = read_table(motion), pick(drawn, "seed", "effects")
+    rows = read_table(motion)
+    seed, effects = pick(drawn, "seed", "effects")
     return lambda model: lateness(spectra, effects, tiles.network, seed, rows[model])
 
 
 def _cubes(
     settings: dict, tiles: Renderer, options: argparse.Namespace
 ) -> Callable[[int, int, np.ndarray], list[Cube] | None]:
-    """The cubes of a chunk's samples by model, SNR and signals; settings: {seed, tolerance,
-    effects, snr_db}.
+    """Return a function that gives the cubes of a sample by model, SNR and signals.
+
+    settings: {seed, tolerance, effects, snr_db}.
     """
     from lowalt.motion import read_table
     from lowalt.targets.cloud import read
@@ -104,13 +104,15 @@ def _cubes(
     stations = tiles.network.stations
     clouds = {cloud.subtype: cloud for cloud in map(read, options.clouds)}
     scene = settings | {"network": options.settings["network"]}
-    maker = Cubes.from_settings(
-        scene, clouds, read_all(options.occluders) if options.occluders else None
-    )
-    return lambda model, level, sample: [
-        maker.of(rows[model], float(snrs[level]), station, heard)
-        for station, heard in zip(stations, sample, strict=True)
-    ]
+    maker = Cubes.from_settings(scene, clouds, read_all(options.occluders))
+
+    def of_sample(model: int, level: int, sample: np.ndarray) -> list[Cube]:
+        """The cubes of one sample, a station each."""
+        snr_db = float(snrs[level])
+        heard = zip(stations, sample, strict=True)
+        return [maker.of(rows[model], snr_db, station, signal) for station, signal in heard]
+
+    return of_sample
 
 
 if __name__ == "__main__":

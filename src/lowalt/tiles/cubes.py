@@ -1,10 +1,12 @@
-"""The cubes of samples: the range cells of every symbol with noise, before the receiver chooses one
-of them.
+"""The cubes of samples: the range cells of every symbol with noise.
+
+They are those before the receiver chooses one of them.
 
 The scene's canceller, if any, has already been applied.
 """
 
 from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,9 +24,30 @@ from lowalt.spectra.cube import Cube
 from lowalt.targets.cloud import Cloud, cloud_of
 
 
+class _Clean(NamedTuple):
+    """A sample without the noise of its SNR, unless the scene's effects add that noise.
+
+    cells: (N, M), range cells; chosen: (N,), the cell that the receiver chose; truths: (N, 7) of
+    every target; power_w: the power (W) that SNRs refer to.
+    """
+
+    cells: np.ndarray
+    chosen: np.ndarray
+    truths: tuple[np.ndarray, ...]
+    power_w: float
+
+
+def _received_symbols(view: View) -> slice | np.ndarray:
+    """The symbols of a look that were received: all, where nothing is said of them."""
+    if view.sampling is None:
+        return slice(None)
+    return view.sampling.present
+
+
 class Cubes:
-    """Makes the cubes of samples and caches the clean ones of the last `kept` motion models and
-    stations.
+    """Makes the cubes of samples and keeps the clean ones of the last motion models and stations.
+
+    kept: how many of them.
     """
 
     def __init__(
@@ -36,8 +59,9 @@ class Cubes:
         empty: bool = False,
         kept: int = 3,
     ) -> None:
-        """Take the scene, clouds by subtype and each subtype's surfaces, where the scene hides
-        points behind them.
+        """Take the scene, clouds by subtype and each subtype's surfaces.
+
+        They are needed where the scene hides points behind them.
 
         every_cell: whether noise at the samples' SNRs is an effect of the scene
         (`set_noise.in_all_cells`); empty: whether the targets reflect nothing, so that noise and
@@ -49,7 +73,7 @@ class Cubes:
         self.every_cell = every_cell
         self.empty = empty
         self.kept = kept
-        self._clean: dict[tuple, tuple] = {}
+        self._clean: dict[tuple, _Clean] = {}
 
     @classmethod
     def from_settings(
@@ -79,62 +103,64 @@ class Cubes:
         each subtype, model, station and SNR.
         Raises: InputError naming the sample that cannot be computed.
         """
-        clean, chosen, truths, power_w = self._seen(row, snr_db, station)
-        cells = clean.astype(np.complex64)
+        clean = self._seen(row, snr_db, station)
+        chosen = clean.chosen
+        cells = clean.cells.astype(np.complex64)
         if not self.every_cell and not np.isposinf(snr_db):
-            rng = stream(
-                self.scene.seed, "cells", row["subtype"], row["model"], station.name, snr_db
-            )
-            noise = add_noise(np.zeros(cells.shape), snr_db, rng, power_w)
+            key = (row["subtype"], row["model"], station.name, snr_db)
+            rng = stream(self.scene.seed, "cells", *key)
+            noise = add_noise(np.zeros(cells.shape), snr_db, rng, clean.power_w)
             for filtered in every(self.scene.effects, "filtered").values():
                 noise = filtered(noise)
-            cells = (clean + noise).astype(np.complex64)
+            cells = (clean.cells + noise).astype(np.complex64)
         cells[chosen < 0] = 0
         if signal is not None:
             there = np.flatnonzero(chosen >= 0)
             cells[there, chosen[there]] = signal[there]
-        return Cube(cells, chosen, truths[0], truths[1:])
+        own_truth, *others = clean.truths
+        return Cube(cells, chosen, own_truth, tuple(others))
 
     def sample(self, row: dict, snr_db: float, station: Station) -> SceneSample:
         """Return a row of the motion table as a station of the scene sees it, at an SNR (dB)."""
-        scene = self.scene.at_snr(snr_db) if self.every_cell else self.scene
-        view = observe(
-            scene, station, cloud_of(self.clouds, row), row, self.occluders.get(row["subtype"])
-        )
+        scene = self.scene
+        if self.every_cell:
+            scene = scene.at_snr(snr_db)
+        surfaces = self.occluders.get(row["subtype"])
+        view = observe(scene, station, cloud_of(self.clouds, row), row, surfaces)
         return SceneSample(scene, view, self.clouds)
 
-    def _seen(
-        self, row: dict, snr_db: float, station: Station
-    ) -> tuple[np.ndarray, np.ndarray, tuple, float]:
-        """Clean cells (N, M), chosen cells (N,), the truth of every target and the power (W) that
-        SNRs refer to.
-        """
-        key = row["subtype"], row["model"], station.name, snr_db if self.every_cell else None
+    def _seen(self, row: dict, snr_db: float, station: Station) -> _Clean:
+        """Return a sample as `_Clean`, computed or kept."""
+        key: tuple = (row["subtype"], row["model"], station.name)
+        if self.every_cell:
+            key = (*key, snr_db)
         if key not in self._clean:
             while len(self._clean) >= self.kept:
                 del self._clean[next(iter(self._clean))]
             self._clean[key] = self._computed(row, snr_db, station)
         return self._clean[key]
 
-    def _computed(self, row: dict, snr_db: float, station: Station) -> tuple:
+    def _computed(self, row: dict, snr_db: float, station: Station) -> _Clean:
         """Compute `_seen`."""
         sample = self.sample(row, snr_db, station)
         received = sample.received()
-        sampling = sample.view.sampling
-        there = slice(None) if sampling is None else sampling.present
-        seen = (sample.without_target() if self.empty else sample).filtered(sample.detection)
+        reflecting = sample
+        if self.empty:
+            reflecting = sample.without_target()
+        seen = reflecting.filtered(sample.detection)
         cells = np.zeros((len(received.cell), seen.shape[1]), np.complex128)
-        cells[there] = seen
+        cells[_received_symbols(sample.view)] = seen
         truths = tuple(true_columns(sample, target) for target in sample.targets)
-        return cells, received.cell, truths, received.power
+        return _Clean(cells, received.cell, truths, received.power)
 
 
 def true_columns(sample: SceneSample, target: View) -> np.ndarray:
-    """Return what is true of the middle of a sample's target at each symbol, (N, 7), columns
-    `spectra.cube.TRUTH`.
+    """Return what is true of the middle of a sample's target at each symbol, (N, 7).
+
+    The columns are `spectra.cube.TRUTH`.
     """
-    place, speed_mps = sample.observed(target)
-    known = np.full((len(speed_mps), 2), -1.0)
-    there = slice(None) if target.sampling is None else target.sampling.present
-    known[there] = np.column_stack([sample.true_cell(target), place])
-    return np.column_stack([geometric(target), known, speed_mps])
+    observed_cell, speed_mps = sample.observed(target)
+    cells = np.full((len(speed_mps), 2), -1.0)
+    of_received = np.column_stack([sample.true_cell(target), observed_cell])
+    cells[_received_symbols(target)] = of_received
+    return np.column_stack([geometric(target), cells, speed_mps])

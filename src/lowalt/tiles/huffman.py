@@ -1,5 +1,4 @@
-"""A DEFLATE encoder for filtered images: Huffman codes fitted to each image, matches only for runs
-of zeros.
+"""A DEFLATE encoder for filtered images: Huffman codes of each image, matches for runs of zeros.
 
 Filtered spectra have almost no repeated strings, so searching for them costs time and saves
 nothing; only the entropy coder remains. It uses only integer arithmetic, so equal images give equal
@@ -25,7 +24,9 @@ U64 = np.uint64
 
 def _lengths_of_matches() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Symbol, extra bits and their number for match lengths 0 .. 258 (RFC 1951, section 3.2.5)."""
-    symbol, extra, bits = (np.zeros(259, np.int64) for _ in range(3))
+    symbol = np.zeros(259, np.int64)
+    extra = np.zeros(259, np.int64)
+    bits = np.zeros(259, np.int64)
     length = 3
     for code in range(257, 285):
         width = max(0, (code - 261) // 4)
@@ -57,10 +58,10 @@ def _count(data, words):
     """How often each symbol occurs, (286,)."""
     # Four tables, since equal neighbours would wait for each other's count.
     tables = np.zeros((4, SYMBOLS), np.int64)
-    place = 0
-    while place < words.size:
-        if words[place] == 0:
-            run = _zero_words(words, place)
+    at = 0
+    while at < words.size:
+        if words[at] == 0:
+            run = _zero_words(words, at)
             if run >= RUN_WORDS:
                 tables[0, 0] += 1
                 left = run * WORD - 1
@@ -69,15 +70,15 @@ def _count(data, words):
                     tables[0, MATCH_SYMBOL[step]] += 1
                     left -= step
                 tables[0, 0] += left
-                place += run
+                at += run
                 continue
-        first = place * WORD
+        first = at * WORD
         for k in range(0, WORD, 4):
             tables[0, data[first + k]] += 1
             tables[1, data[first + k + 1]] += 1
             tables[2, data[first + k + 2]] += 1
             tables[3, data[first + k + 3]] += 1
-        place += 1
+        at += 1
     for byte in range(words.size * WORD, data.size):
         tables[0, data[byte]] += 1
     tables[0, END] += 1
@@ -88,8 +89,9 @@ def _count(data, words):
 
 @PLAIN
 def _put(out, state, code, length):
-    """Append `length` bits, at most 60, without a branch; state: word being filled, bits in it, its
-    number.
+    """Append `length` bits, at most 60, without a branch.
+
+    state: word being filled, bits in it, its number.
     """
     word = state[0]
     bits = state[1]
@@ -104,8 +106,9 @@ def _put(out, state, code, length):
 
 @PLAIN
 def _put_words(data, table, first, last, out, state):
-    """Append the codes of the bytes of words first .. last - 1, four bytes at a time (at most 60
-    bits).
+    """Append the codes of the bytes of words first .. last - 1.
+
+    Four bytes are appended at a time, which have at most 60 bits.
     """
     low = U64(0x7FFF)
     shift = U64(16)
@@ -131,7 +134,9 @@ def _put_words(data, table, first, last, out, state):
         word = (code >> one) >> (full - bits) if ends else filled
         bits = (bits + length) & full
         number += ends
-    state[0], state[1], state[2] = word, bits, number
+    state[0] = word
+    state[1] = bits
+    state[2] = number
 
 
 @PLAIN
@@ -142,8 +147,9 @@ def _put_symbol(out, state, table, symbol):
 
 @PLAIN
 def _put_run(out, state, table, run):
-    """Append `run` words of zeros: one literal, then matches at distance 1 and what is left of
-    them.
+    """Append `run` words of zeros.
+
+    They are one literal, then matches at distance 1 and what is left of them.
     """
     _put_symbol(out, state, table, np.int64(0))
     left = run * WORD - 1
@@ -169,7 +175,7 @@ def _table(counts, longest):
 
 @PLAIN
 def _encode(data, words, counts, order, out):
-    """Write one final block with its own Huffman code to `out` (uint64); return its size in bytes."""
+    """Write one final block with its own Huffman code to `out` (uint64); return its bytes."""
     table = _table(counts, np.int64(LONGEST))
     # The one distance code comes last, one bit long.
     lengths = np.ones(SYMBOLS + 1, np.int64)
@@ -189,19 +195,19 @@ def _encode(data, words, counts, order, out):
     for length in lengths:
         _put_symbol(out, state, header_table, length)
     # Typed numbers, because numba would compile the function again for a plain 0.
-    place = np.int64(0)
+    at = np.int64(0)
     pending = np.int64(0)
-    while place < words.size:
-        if words[place] == 0:
-            run = _zero_words(words, place)
+    while at < words.size:
+        if words[at] == 0:
+            run = _zero_words(words, at)
             if run >= RUN_WORDS:
-                _put_words(data, table, pending, place, out, state)
+                _put_words(data, table, pending, at, out, state)
                 _put_run(out, state, table, run)
-                place += run
-                pending = place
+                at += run
+                pending = at
                 continue
-        place += 1
-    _put_words(data, table, pending, place, out, state)
+        at += 1
+    _put_words(data, table, pending, at, out, state)
     for byte in range(words.size * WORD, data.size):
         _put_symbol(out, state, table, np.int64(data[byte]))
     _put_symbol(out, state, table, np.int64(END))

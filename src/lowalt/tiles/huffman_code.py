@@ -15,26 +15,28 @@ LONGEST = 15
 
 @PLAIN
 def _sort(weights, order):
-    """Fill `order` with the symbols that occur, by rising weight and then by number; return how
-    many there are.
+    """Fill `order` with the symbols that occur, by rising weight and then by number.
+
+    Returns how many there are.
     """
     nodes = 0
     for symbol in range(weights.size):
         if weights[symbol] == 0:
             continue
-        place = nodes
-        while place > 0 and weights[order[place - 1]] > weights[symbol]:
-            order[place] = order[place - 1]
-            place -= 1
-        order[place] = symbol
+        at = nodes
+        while at > 0 and weights[order[at - 1]] > weights[symbol]:
+            order[at] = order[at - 1]
+            at -= 1
+        order[at] = symbol
         nodes += 1
     return nodes
 
 
 @PLAIN
 def _depths(weights, order, nodes):
-    """Depth of each leaf in Huffman's tree over symbols `order`, and the largest: (2 nodes,),
-    leaves first.
+    """Return the depth of each leaf in Huffman's tree over symbols `order`, and the largest depth.
+
+    The depths (2 nodes,) have the leaves first.
     """
     weight = np.zeros(2 * nodes, np.int64)
     parent = np.zeros(2 * nodes, np.int64)
@@ -63,8 +65,9 @@ def _depths(weights, order, nodes):
 
 @PLAIN
 def code_lengths(counts, longest):
-    """Lengths of a Huffman code for `counts`, at most `longest` bits, 0 for symbols that do not
-    occur.
+    """Lengths of a Huffman code for `counts`, at most `longest` bits.
+
+    They are 0 for symbols that do not occur.
 
     Ties go to the lower symbol. Where the best code is too long, counts are halved until it fits.
     """

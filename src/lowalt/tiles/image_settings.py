@@ -1,5 +1,6 @@
-"""The settings of an image (the configuration's `images` block): size, amplitude scale and colour
-map.
+"""The settings of an image (the configuration's `images` block).
+
+They are size, amplitude scale and colour map.
 """
 
 from dataclasses import dataclass, field
@@ -24,23 +25,20 @@ def colour_map(name: str) -> np.ndarray:
         raise InputError(
             f"images.colour_map is {name!r}, expected a matplotlib name such as 'viridis' or 'gray'"
         )
-    table = matplotlib.colormaps[name](np.linspace(0, 1, 256), bytes=True)[:, :3].copy()
+    colours = matplotlib.colormaps[name](np.linspace(0, 1, 256), bytes=True)
+    table = colours[:, :3].copy()
     table.setflags(write=False)
     return table
 
 
 def paint(images: np.ndarray, palette: np.ndarray) -> np.ndarray:
-    """Return RGB images: (..., H, W) uint8 index values and a (256, 3) palette -> (..., H, W, 3)
-    uint8.
-    """
+    """Return RGB images (..., H, W, 3) uint8 of index values (..., H, W) and a palette (256, 3)."""
     return np.take(palette, images, axis=0)
 
 
 @dataclass(frozen=True)
 class Images:
-    """`size` pixels per side of each image; values are scaled by `scale`, then coloured by
-    `colour_map`.
-    """
+    """The settings of an image: its pixels per side, its amplitude scale and its colour map."""
 
     size: int = 256
     scale: Scale = field(default_factory=Scale)

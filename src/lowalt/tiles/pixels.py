@@ -3,6 +3,7 @@
 import numpy as np
 
 from lowalt.machine.jit import PLAIN
+from lowalt.spectra.interface import ZERO_SIGNED
 
 
 @PLAIN
@@ -30,7 +31,7 @@ def index_image(values, signed, lowest, shift, base, cut, out):
     size = values.shape[1]
     largest = _peak(values)[0]
     if largest == 0:
-        out[:] = 128 if signed else 0
+        out[:] = ZERO_SIGNED if signed else 0
         return
     x = np.empty(size, np.float32)
     bits = x.view(np.int32)
@@ -48,7 +49,7 @@ def index_image(values, signed, lowest, shift, base, cut, out):
             steps[c] = base[keys[c]] + np.int32(bits[c] >= cut[keys[c]])
         if signed:
             for c in range(size):
-                row[c] = 128 - steps[c] if line[c] < 0 else 128 + steps[c]
+                row[c] = ZERO_SIGNED - steps[c] if line[c] < 0 else ZERO_SIGNED + steps[c]
         else:
             for c in range(size):
                 row[c] = steps[c]

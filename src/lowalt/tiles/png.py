@@ -17,23 +17,33 @@ from lowalt.machine.jit import PLAIN
 from lowalt.tiles.huffman import zlib_compress
 
 MOST_EXPANSION = 1032
-"""Most bytes that one byte of a zlib stream gives. Source: RFC 1951, a match of 258 bytes takes at
-least two bits.
+"""Most bytes that one byte of a zlib stream gives.
+
+Source: RFC 1951, a match of 258 bytes takes at least two bits.
 """
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
+PAETH = 4
+"""Number of the filter type, which begins each filtered row."""
+
+
+HEADER = struct.Struct(">IIBBBBB")
+"""Width, height, bits per pixel, colour type, compression, filters, interlacing."""
+DEPTH = 8
+OF_PALETTE = 3
+"""Bits per pixel, and the colour type whose pixels are indices into a palette."""
 
 
 def _chunk(name: bytes, body: bytes) -> bytes:
     """A chunk of a PNG: length, name, body, checksum."""
-    return (
-        struct.pack(">I", len(body)) + name + body + struct.pack(">I", deflate.crc32(name + body))
-    )
+    checksum = struct.pack(">I", deflate.crc32(name + body))
+    return struct.pack(">I", len(body)) + name + body + checksum
 
 
 @PLAIN
 def apply_paeth(image, out):
-    """Filter image (H, W) uint8 into out (H, W + 1) uint8: filter type 4, then pixel minus Paeth
-    predictor.
+    """Filter image (H, W) uint8 into out (H, W + 1) uint8.
+
+    Filter type 4 is the pixel minus the Paeth predictor.
 
     Source: PNG specification (W3C, third edition), section 9.
     """
@@ -41,7 +51,7 @@ def apply_paeth(image, out):
     for r in range(height):
         line = out[r]
         row = image[r]
-        line[0] = 4
+        line[0] = PAETH
         if r == 0:
             line[1] = row[0]
             for c in range(1, width):
@@ -56,7 +66,12 @@ def apply_paeth(image, out):
             to_a = np.int16(abs(b - d))
             to_b = np.int16(abs(a - d))
             to_d = np.int16(abs(np.int16(a + b) - np.int16(d + d)))
-            best = a if to_a <= to_b and to_a <= to_d else (b if to_b <= to_d else d)
+            if to_a <= to_b and to_a <= to_d:
+                best = a
+            elif to_b <= to_d:
+                best = b
+            else:
+                best = d
             line[c + 1] = np.uint8(np.int16(row[c]) - best)
 
 
@@ -75,13 +90,20 @@ def encode(image: np.ndarray, palette: np.ndarray) -> bytes:
 
 
 def packed(shape: tuple[int, int], palette: np.ndarray, stream: bytes) -> bytes:
-    """Return the PNG file of an 8-bit palette image (H, W) from the zlib stream of its filtered
-    rows.
+    """Return the PNG file of an 8-bit palette image (H, W) from the zlib stream of its rows.
+
+    The rows are filtered.
     """
-    header = struct.pack(">IIBBBBB", shape[1], shape[0], 8, 3, 0, 0, 0)
+    height, width = shape
+    header = HEADER.pack(width, height, DEPTH, OF_PALETTE, 0, 0, 0)
     colours = np.ascontiguousarray(palette).tobytes()
-    parts = ((b"IHDR", header), (b"PLTE", colours), (b"IDAT", stream), (b"IEND", b""))
-    return SIGNATURE + b"".join(_chunk(*part) for part in parts)
+    chunks = [
+        _chunk(b"IHDR", header),
+        _chunk(b"PLTE", colours),
+        _chunk(b"IDAT", stream),
+        _chunk(b"IEND", b""),
+    ]
+    return SIGNATURE + b"".join(chunks)
 
 
 def _chunks(data: bytes) -> list[tuple[bytes, memoryview]]:
@@ -92,41 +114,49 @@ def _chunks(data: bytes) -> list[tuple[bytes, memoryview]]:
     if data[:8] != SIGNATURE:
         raise InputError("image: no PNG signature, expected a palette PNG")
     view = memoryview(data)
-    place = 8
+    start = 8
     chunks = []
-    while place + 12 <= len(data):
-        size = int.from_bytes(view[place : place + 4], "big")
-        end = place + 12 + size
-        if end > len(data) or deflate.crc32(view[place + 4 : end - 4]) != int.from_bytes(
-            view[end - 4 : end], "big"
-        ):
+    # A chunk has its length in 4 bytes, its name in 4, its body, and a checksum in 4.
+    while start + 12 <= len(data):
+        size = int.from_bytes(view[start : start + 4], "big")
+        end = start + 12 + size
+        if end > len(data):
             break
-        chunks.append((bytes(view[place + 4 : place + 8]), view[place + 8 : end - 4]))
-        if chunks[-1][0] == b"IEND":
+        checksum = int.from_bytes(view[end - 4 : end], "big")
+        if deflate.crc32(view[start + 4 : end - 4]) != checksum:
+            break
+        name = bytes(view[start + 4 : start + 8])
+        chunks.append((name, view[start + 8 : end - 4]))
+        if name == b"IEND":
             return chunks
-        place = end
-    raise InputError(f"image: the PNG is damaged or cut off at byte {place}")
+        start = end
+    raise InputError(f"image: the PNG is damaged or cut off at byte {start}")
 
 
 def decode(data: bytes) -> tuple[np.ndarray, np.ndarray]:
-    """Return index image (H, W) uint8 and palette (256, 3) uint8 of a palette PNG, whoever wrote
-    it.
+    """Return index image (H, W) uint8 and palette (256, 3) uint8 of a palette PNG.
+
+    Whoever wrote the file.
 
     Raises: InputError where the bytes are no 8-bit palette PNG or are damaged.
     """
     chunks = _chunks(data)
-    header = chunks[0][1] if chunks[0][0] == b"IHDR" and len(chunks[0][1]) == 13 else bytes(13)
-    width, height, depth, colour, *_ = struct.unpack(">IIBBBBB", header)
-    if (depth, colour) != (8, 3):
+    name, header = chunks[0]
+    if name != b"IHDR" or len(header) != HEADER.size:
+        header = memoryview(bytes(HEADER.size))
+    width, height, depth, colour, *_ = HEADER.unpack(header)
+    if (depth, colour) != (DEPTH, OF_PALETTE):
         raise InputError(
-            f"image: PNG of bit depth {depth} and colour type {colour}, expected an 8-bit palette PNG"
+            f"image: PNG of bit depth {depth} and colour type {colour}, expected an 8-bit palette "
+            "PNG"
         )
     palette = np.zeros((256, 3), np.uint8)
     for name, body in chunks:
         if name == b"PLTE":
             if len(body) % 3 or len(body) > palette.size:
                 raise InputError(
-                    f"image: a palette of {len(body)} bytes, expected up to 256 colours of three bytes"
+                    f"image: a palette of {len(body)} bytes, expected up to 256 colours of three "
+                    "bytes"
                 )
             table = np.frombuffer(body, np.uint8).reshape(-1, 3)
             palette[: len(table)] = table

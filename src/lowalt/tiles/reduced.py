@@ -1,5 +1,6 @@
-"""Reduced images of a chunk, made from its tiles while these are still pixels: no PNG has to be
-decoded for them.
+"""Reduced images of a chunk, made from its tiles while these are still pixels.
+
+No PNG has to be decoded for them.
 
 A file (.npy) holds (samples, views, size, size) uint8 in the order of the tiles file: `resize` of
 the views of every tile, the same bytes as from the decoded PNG, since PNG loses nothing.
@@ -35,8 +36,7 @@ def target(text: str) -> tuple[int, Path]:
 def writing(
     targets: list[tuple[int, Path]], samples: int, stations: int, spectra: int
 ) -> Iterator[Callable[[int, np.ndarray], None]]:
-    """Open reduced files and yield a function (number, tile) that fills the place of one sample in
-    all of them.
+    """Open reduced files; yield a function (number, tile) that writes one sample into all of them.
 
     targets: size (pixels per side) and path of each file; a tile is (stations S, spectra S) uint8.
     The files appear under their names when the block ends without an error.
@@ -50,7 +50,9 @@ def writing(
 
         def fill(number: int, tile: np.ndarray) -> None:
             """Write the reduced images of one sample's tile into all files."""
-            images = split(tile, spectra) if arrays else tile
+            if not arrays:
+                return
+            images = split(tile, spectra)
             for array in arrays:
                 array[number] = resize(images, array.shape[-1])
 
@@ -75,6 +77,7 @@ def read(path: str | Path, size: int, samples: int) -> np.ndarray:
         or (images.shape[0], *images.shape[2:]) != (samples, size, size)
     ):
         raise InputError(
-            f"{path}: {images.dtype} {images.shape}, expected uint8 ({samples}, views, {size}, {size})"
+            f"{path}: {images.dtype} {images.shape}, expected uint8 ({samples}, views, {size}, "
+            f"{size})"
         )
     return images

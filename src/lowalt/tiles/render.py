@@ -1,5 +1,6 @@
-"""From symbol-domain signals to index images in one pass: spectra, resampling, scaling, all in
-float32.
+"""From symbol-domain signals to index images in one pass: spectra, resampling, scaling.
+
+All of it is in float32.
 
 The arithmetic is fixed (additions, products, divisions, square roots and comparisons in one order),
 so the pixels depend on the signal alone: not on the batch, the worker or the machine. A signal is
@@ -8,6 +9,7 @@ are scaled by their own largest value, so nothing is lost.
 """
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -29,9 +31,25 @@ MOST_PIXELS = 2**29
 """Pixels of a tile."""
 
 
+class Resampling(NamedTuple):
+    """How one spectrum is resampled to S x S pixels, and its work arrays.
+
+    source, weights: rows of the spectrum and their weights, (S, taps); columns, shares: (taps, S);
+    values: the spectrum, (points, starts); between: what stands between the two axes; rows_first:
+    whether the resampling begins with the rows.
+    """
+
+    source: np.ndarray
+    weights: np.ndarray
+    columns: np.ndarray
+    shares: np.ndarray
+    values: np.ndarray
+    between: np.ndarray
+    rows_first: bool
+
+
 class Renderer:
-    """Everything that is the same for all samples: twiddles, weights, tables. Reusable, holds its
-    work arrays.
+    """Makes tiles: it holds twiddles, weights, tables and work arrays for all samples.
 
     Three stations' tones:
 
@@ -58,24 +76,18 @@ class Renderer:
         pixels = len(network.stations) * len(spectra) * images.size**2
         if pixels > MOST_PIXELS:
             raise InputError(
-                f"images.size is {images.size}: a tile of {pixels} pixels, expected at most {MOST_PIXELS}"
+                f"images.size is {images.size}: a tile of {pixels} pixels, expected at most "
+                f"{MOST_PIXELS}"
             )
         self._of_cells = {name for name in spectra if isinstance(spectrum(name), OfCells)}
         self._plans = {name: self._plan(name) for name in spectra}
         self._tables = {
-            name: [
-                spectrum(name).tables(
-                    spectra[name], station.frequency_hz, network.symbol_interval_s
-                )
-                for station in network.stations
-            ]
-            for name in spectra
-            if name not in self._of_cells
+            name: self._tables_of(name) for name in spectra if name not in self._of_cells
         }
-        steps = {name: lookup(images.scale, levels(name)) for name in spectra}
-        self._lookup = {
-            name: (t.lowest, t.shift, t.base, t.cut.view(np.int32)) for name, t in steps.items()
-        }
+        self._lookup = {}
+        for name in spectra:
+            found = lookup(images.scale, levels(name))
+            self._lookup[name] = (found.lowest, found.shift, found.base, found.cut.view(np.int32))
         self._image = np.empty((images.size, images.size), np.float32)
 
     @classmethod
@@ -91,10 +103,17 @@ class Renderer:
             Images.from_settings(images),
         )
 
-    def _plan(self, name: str) -> tuple:
-        """Taps of one spectrum's rows and columns, buffers for its values and between the axes, the
-        axes' order.
-        """
+    def _tables_of(self, name: str) -> list[tuple[np.ndarray, ...]]:
+        """Tables of one spectrum, a tuple of arrays a station."""
+        interval_s = self.network.symbol_interval_s
+        settings = self.spectra[name]
+        result = []
+        for station in self.network.stations:
+            result.append(spectrum(name).tables(settings, station.frequency_hz, interval_s))
+        return result
+
+    def _plan(self, name: str) -> Resampling:
+        """Return the plan of one spectrum."""
         setting = self.spectra[name]
         kind = spectrum(name)
         symbols = self.network.symbols
@@ -115,23 +134,25 @@ class Renderer:
         columns, shares = column_taps(count, size, hop)
         # Rows that become fewer go first, so that there is less to do along time.
         rows_first = points > size
-        between = np.empty((size, starts) if rows_first else (points, size), np.float32)
+        shape = (points, size)
+        if rows_first:
+            shape = (size, starts)
+        between = np.empty(shape, np.float32)
         values = np.empty((points, starts), np.float32)
-        return source, weights, columns, shares, values, between, rows_first
+        return Resampling(source, weights, columns, shares, values, between, rows_first)
 
     def plan(self, name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Source rows and weights (S, taps), columns and shares (taps, S) of one spectrum's
-        resampling.
-        """
-        return self._plans[name][:4]
+        """Return rows and weights (S, taps), columns and shares (taps, S) of one spectrum."""
+        plan = self._plans[name]
+        return plan.source, plan.weights, plan.columns, plan.shares
 
     def rows_first(self, name: str) -> bool:
         """Whether the resampling of one spectrum begins with its rows."""
-        return self._plans[name][-1]
+        return self._plans[name].rows_first
 
     def starts(self, name: str) -> int:
         """Number of symbols, from the first, at which a window of one spectrum is computed."""
-        return self._plans[name][4].shape[1]
+        return self._plans[name].values.shape[1]
 
     def tables(self, name: str) -> list[tuple[np.ndarray, ...]]:
         """Tables of one spectrum, a tuple of arrays a station."""
@@ -145,34 +166,35 @@ class Renderer:
         out: np.ndarray,
         late: np.ndarray | None = None,
     ) -> None:
-        """Fill out (S, S) float32 with the resampled spectrum `name` of one normalised signal
-        (symbols,), or of a cube where the spectrum is made of range cells.
+        """Fill out (S, S) float32 with the resampled spectrum `name` of one signal or cube.
 
-        late: (symbols,), how many symbol intervals after its nominal instant each symbol came, None
-        for 0. Where `spectra.times` is "known", symbols that are exactly zero were not received.
+        signal: normalised (symbols,), or a cube where the spectrum is made of range cells; late:
+        (symbols,), how many symbol intervals after its nominal instant each symbol came, None for
+        0. Where `spectra.times` is "known", symbols that are exactly zero were not received.
         """
-        source, weights, columns, shares, values, between, rows_first = self._plans[name]
+        plan = self._plans[name]
         setting = self.spectra[name]
         kind = spectrum(name)
         if isinstance(signal, Cube):
-            kind.fill_cells(signal, setting, values)
+            kind.fill_cells(signal, setting, plan.values)
         elif self.spectra.times == "even" or even(signal, late):
             re = np.ascontiguousarray(signal.real)
             im = np.ascontiguousarray(signal.imag)
-            kind.fill(re, im, setting, self._tables[name][station], values)
+            kind.fill(re, im, setting, self._tables[name][station], plan.values)
         else:
-            times = np.arange(len(signal)) + (0.0 if late is None else late)
+            times = np.arange(len(signal), dtype=np.float64)
+            if late is not None:
+                times += late
             frequency_hz = self.network.stations[station].frequency_hz
+            interval_s = self.network.symbol_interval_s
             assert isinstance(kind, KnowsTimes)  # as `Spectra` has checked
-            kind.fill_known(
-                signal, times, setting, frequency_hz, self.network.symbol_interval_s, values
-            )
-        if rows_first:
-            across_rows(values, source, weights, between)
-            along_rows(between, columns, shares, out)
+            kind.fill_known(signal, times, setting, frequency_hz, interval_s, plan.values)
+        if plan.rows_first:
+            across_rows(plan.values, plan.source, plan.weights, plan.between)
+            along_rows(plan.between, plan.columns, plan.shares, out)
         else:
-            along_rows(values, columns, shares, between)
-            across_rows(between, source, weights, out)
+            along_rows(plan.values, plan.columns, plan.shares, plan.between)
+            across_rows(plan.between, plan.source, plan.weights, out)
 
     def check(self, signals: np.ndarray) -> None:
         """Refuse signals that are not (stations, symbols) of this network, or not finite.
@@ -193,8 +215,9 @@ class Renderer:
         out: np.ndarray,
         late: np.ndarray | None = None,
     ) -> None:
-        """Fill out (S, S) uint8 with the index image of one normalised signal (symbols,); late: as
-        in `values`.
+        """Fill out (S, S) uint8 with the index image of one normalised signal (symbols,).
+
+        late: as in `values`.
         """
         self.values(signal, station, name, self._image, late)
         index_image(self._image, spectrum(name).SIGNED, *self._lookup[name], out)
@@ -218,8 +241,9 @@ class Renderer:
         late: np.ndarray | None = None,
         cubes: Sequence[Cube] | None = None,
     ) -> np.ndarray:
-        """Return the tile of one sample: (stations, symbols) complex64 -> (stations S, spectra S)
-        uint8.
+        """Return the tile of one sample.
+
+        signals: (stations, symbols) complex64; the tile is (stations S, spectra S) uint8.
 
         late: (stations, symbols), as in `values`, None for symbols on time; cubes: a cube a
         station, where spectra are made of range cells.
@@ -228,15 +252,16 @@ class Renderer:
         self.check(signals)
         stations = len(self.network.stations)
         size = self.images.size
-        out = (
-            np.empty((stations * size, len(self.spectra) * size), np.uint8) if out is None else out
-        )
+        if out is None:
+            out = np.empty((stations * size, len(self.spectra) * size), np.uint8)
         for station in range(stations):
             signal = normalised(signals[station])
+            row = out[station * size : (station + 1) * size]
+            delay = _of_station(late, station)
             for view, name in enumerate(self.spectra):
-                part = out[station * size : (station + 1) * size, view * size : (view + 1) * size]
+                image = row[:, view * size : (view + 1) * size]
                 source = self._source(name, signal, cubes, station)
-                self.image(source, station, name, part, None if late is None else late[station])
+                self.image(source, station, name, image, delay)
         return out
 
     def some(
@@ -246,8 +271,9 @@ class Renderer:
         late: np.ndarray | None = None,
         cubes: Sequence[Cube] | None = None,
     ) -> np.ndarray:
-        """Return images of one sample by number, spectra station + view: (stations, symbols) -> (n,
-        S, S) uint8.
+        """Return images of one sample by number, spectra station + view: (n, S, S) uint8.
+
+        signals: (stations, symbols).
 
         They are those of `tile`, and only these are computed.
         Raises: InputError where the shape does not fit the network or a value is not finite.
@@ -255,17 +281,25 @@ class Renderer:
         self.check(signals)
         out = np.empty((len(numbers), self.images.size, self.images.size), np.uint8)
         names = list(self.spectra)
-        for place, number in enumerate(numbers):
+        for image, number in zip(out, numbers, strict=True):
             station, view = divmod(int(number), len(names))
-            delay = None if late is None else late[station]
+            delay = _of_station(late, station)
             source = self._source(names[view], normalised(signals[station]), cubes, station)
-            self.image(source, station, names[view], out[place], delay)
+            self.image(source, station, names[view], image, delay)
         return out
 
 
+def _of_station(late: np.ndarray | None, station: int) -> np.ndarray | None:
+    """The delays of one station's symbols, None for symbols on time."""
+    if late is None:
+        return None
+    return late[station]
+
+
 def normalised(signal: np.ndarray) -> np.ndarray:
-    """Return a signal of any shape as complex64, divided by the power of two that brings it just
-    below 1.
+    """Return a signal of any shape as complex64.
+
+    It is divided by the power of two that brings it just below 1.
     """
     signal = np.asarray(signal)
     largest = max(np.abs(signal.real).max(), np.abs(signal.imag).max())
@@ -284,8 +318,9 @@ def levels(name: str) -> int:
 
 
 def split(tile: np.ndarray, spectra: int) -> np.ndarray:
-    """Return the images of a tile, (stations S, spectra S) -> (stations spectra, S, S), station by
-    station.
+    """Return the images of a tile, (stations S, spectra S) -> (stations spectra, S, S).
+
+    They come station by station.
 
     Raises: InputError where the tile is not made of rows of so many squares.
     """
@@ -300,8 +335,9 @@ def split(tile: np.ndarray, spectra: int) -> np.ndarray:
 
 
 def join(images: np.ndarray, spectra: int) -> np.ndarray:
-    """Return the tile of images, (stations spectra, S, S) -> (stations S, spectra S): the inverse
-    of `split`.
+    """Return the tile (stations S, spectra S) of images (stations spectra, S, S).
+
+    It is the inverse of `split`.
     """
     size = images.shape[-1]
     grid = images.reshape(-1, spectra, size, size).swapaxes(1, 2)

@@ -1,5 +1,6 @@
-"""The resampling kernel of the project: a triangle, with one formula for shrinking and for
-enlarging.
+"""The resampling kernel of the project: a triangle.
+
+One formula serves shrinking and enlarging.
 
 Sample i of n is at i + 1/2, output j of m at (j + 1/2) n / m. The weight of sample i in output j is
     max(0, 1 - |i + 1/2 - (j + 1/2) n / m| / max(1, n / m)),
@@ -53,21 +54,22 @@ def taps(size: int, out: int) -> tuple[np.ndarray, np.ndarray]:
 
 @lru_cache(maxsize=64)
 def row_taps(size: int, out: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return `taps` as `across_rows` wants them: sources (out, taps) int64, weights (out, taps)
-    float32.
+    """Return `taps` as `across_rows` wants them: sources (out, taps) and their weights.
+
+    Sources are int64, weights (out, taps) float32.
 
     All callers share the arrays, which must not be changed.
     """
     first, weights = taps(size, out)
-    return np.ascontiguousarray(first[:, None] + np.arange(weights.shape[1])), weights.astype(
-        np.float32
-    )
+    sources = first[:, None] + np.arange(weights.shape[1])
+    return np.ascontiguousarray(sources), weights.astype(np.float32)
 
 
 @lru_cache(maxsize=64)
 def column_taps(size: int, out: int, hop: int = 1) -> tuple[np.ndarray, np.ndarray]:
-    """Return `taps` as `along_rows` wants them: columns (taps, out) uintp, every hop-th, and shares
-    float32.
+    """Return `taps` as `along_rows` wants them: columns (taps, out), every hop-th, and shares.
+
+    Columns are uintp, shares float32.
 
     All callers share the arrays, which must not be changed.
     """
@@ -75,9 +77,8 @@ def column_taps(size: int, out: int, hop: int = 1) -> tuple[np.ndarray, np.ndarr
     weights = np.pad(weights, ((0, 0), (0, weights.shape[1] % 2)))
     columns = np.minimum(first[:, None] + np.arange(weights.shape[1]), size - 1) * hop
     # Unsigned indices, so that the compiled loop does not test for negative ones.
-    return np.ascontiguousarray(columns.T.astype(np.uintp)), np.ascontiguousarray(
-        weights.T.astype(np.float32)
-    )
+    columns = np.ascontiguousarray(columns.T.astype(np.uintp))
+    return columns, np.ascontiguousarray(weights.T.astype(np.float32))
 
 
 @PLAIN
@@ -100,8 +101,9 @@ def along_rows(values, columns, shares, out):
 
 @PLAIN
 def across_rows(values, source, weights, out):
-    """The first axis: values (points, n) -> out (S, n); source, weights: (S, taps), summed in
-    order.
+    """The first axis: values (points, n) -> out (S, n).
+
+    source, weights: (S, taps), summed in order.
     """
     for j in range(out.shape[0]):
         line = out[j]
@@ -149,5 +151,6 @@ def resize(images: np.ndarray, size: int) -> np.ndarray:
         return images.copy()
     stack = np.ascontiguousarray(images).reshape(-1, *images.shape[-2:])
     out = np.empty((len(stack), size, size), np.uint8)
-    _resize(stack, *row_taps(images.shape[-1], size), *column_taps(images.shape[-1], size), out)
+    before = images.shape[-1]
+    _resize(stack, *row_taps(before, size), *column_taps(before, size), out)
     return out.reshape(*images.shape[:-2], size, size)

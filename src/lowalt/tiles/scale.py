@@ -1,9 +1,11 @@
-"""Maps amplitudes to 256 index values: the scale as a list of thresholds, and lookup tables for
-them.
+"""Maps amplitudes to 256 index values.
+
+The scale is a list of thresholds, for which there are lookup tables.
 
 With x = value / the image's own largest |value|, and y = f(x) in [0, 1],
-    linear   y = x          decibel   y = max(0, 1 + 20 log10(x) / floor_db)          power   y =
-    x^gamma,
+    linear   y = x
+    decibel  y = max(0, 1 + 20 log10(x) / floor_db)
+    power    y = x^gamma
 a spectrum of magnitudes takes the index floor(255 y + 1/2), a signed one 128 +- floor(127 y + 1/2),
 exactly symmetric about 128. Every f increases, so an index is the number of thresholds that x
 reaches. Thresholds are computed once in float64 and comparisons are exact, so no pixel needs a
@@ -22,8 +24,9 @@ SCALES = ("linear", "decibel", "power")
 
 @dataclass(frozen=True)
 class Scale:
-    """An amplitude scale: `name` of SCALES, `floor_db` > 0 (decibel only), `gamma` > 0 (power
-    only).
+    """An amplitude scale.
+
+    name: of SCALES; floor_db: > 0, decibel only; gamma: > 0, power only.
     """
 
     name: str = "decibel"
@@ -37,24 +40,23 @@ class Scale:
             ("floor_db", self.floor_db, 1, 140),
             ("gamma", self.gamma, 0.2, 2),
         ):
-            good = (
-                isinstance(value, (int, float))
-                and not isinstance(value, bool)
-                and low <= value <= high
-            )
-            if not good:
+            is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
+            if not is_number or not low <= value <= high:
                 raise InputError(
                     f"images.{key} is {value!r}, expected a number from {low} to {high}"
                 )
 
     def thresholds(self, levels: int) -> np.ndarray:
-        """Return the x at which the index rises to 1 .. levels, shape (levels,), float64,
-        ascending, in (0, 1).
+        """Return the x at which the index rises to 1 .. levels, (levels,) float64.
+
+        They ascend in (0, 1).
         """
         y = (np.arange(1, levels + 1) - 0.5) / levels
         if self.name == "decibel":
             return portable.exp(self.floor_db * (y - 1) * (portable.LN_10 / 20))
-        return y if self.name == "linear" else portable.power(y, 1 / self.gamma)
+        if self.name == "linear":
+            return y
+        return portable.power(y, 1 / self.gamma)
 
 
 @dataclass(frozen=True)
@@ -79,7 +81,8 @@ def lookup(scale: Scale, levels: int) -> Lookup:
     thresholds = scale.thresholds(levels).astype(np.float32)
     bits = thresholds.view(np.int32)
     top = int(np.float32(1).view(np.int32))
-    lowest = int(np.ldexp(np.float32(1), np.frexp(thresholds[0])[1] - 1).view(np.int32))
+    power_below = np.ldexp(np.float32(1), np.frexp(thresholds[0])[1] - 1)
+    lowest = int(power_below.view(np.int32))
     shift = 0
     keys = bits
     for mantissa in range(6, 24):

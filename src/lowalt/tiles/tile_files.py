@@ -1,5 +1,6 @@
-"""The tiles file of a chunk: all its PNGs one after the other, (`data` uint8, `offsets` int64) in
-an .npz.
+"""The tiles file of a chunk: all its PNGs one after the other in an .npz.
+
+Its arrays are `data` uint8 and `offsets` int64.
 
 The archive is not compressed, so it can be written as a stream and read image by image, with the
 memory of one sample.
@@ -20,8 +21,9 @@ from lowalt.files.errors import InputError
 
 
 def npy_header(dtype: str, shape: tuple[int, ...]) -> bytes:
-    """Return the .npy header (format 1.0) of an array; the padding of NumPy's own changed between
-    versions.
+    """Return the .npy header (format 1.0) of an array.
+
+    The padding of NumPy's own changed between versions.
     """
     text = f"{{'descr': '{dtype}', 'fortran_order': False, 'shape': {tuple(map(int, shape))}, }}"
     text = text.ljust(-(-(11 + len(text)) // 64) * 64 - 11) + "\n"
@@ -38,8 +40,9 @@ def _crc_behind(header: bytes, size: int) -> int:
 
 
 def write(path: str | Path, images: Iterable[bytes]) -> tuple[int, int]:
-    """Write encoded images in their order; return their number and bytes. Equal images give equal
-    files.
+    """Write encoded images in their order; return their number and bytes.
+
+    Equal images give equal files.
     """
     offsets = [0]
     blank = npy_header("|u1", (0,))
@@ -61,15 +64,13 @@ def write(path: str | Path, images: Iterable[bytes]) -> tuple[int, int]:
         archive.fp.seek(info.header_offset)
         archive.fp.write(info.FileHeader(zip64=True) + header)
         table = np.array(offsets, "<i8")
-        archive.writestr(
-            zipfile.ZipInfo("offsets.npy"), npy_header("<i8", (len(table),)) + table.tobytes()
-        )
+        content = npy_header("<i8", (len(table),)) + table.tobytes()
+        archive.writestr(zipfile.ZipInfo("offsets.npy"), content)
     return len(offsets) - 1, offsets[-1]
 
 
 def stored_array(path: Path, name: str) -> tuple[np.dtype, int, int]:
-    """Return type, length and place in the file (bytes) of a one-dimensional array of an
-    uncompressed .npz.
+    """Return type, length and first byte of a one-dimensional array of an uncompressed .npz.
 
     Raises: InputError naming the file where it has no such array or is cut off.
     """
@@ -100,7 +101,9 @@ def map_array(path: Path, name: str) -> np.ndarray:
     dtype, count, start = stored_array(path, name)
     if dtype.hasobject:
         raise InputError(f"{path}: {name} holds objects, expected plain values")
-    return np.memmap(path, dtype, "r", start, (count,)) if count else np.zeros(0, dtype)
+    if count == 0:
+        return np.zeros(0, dtype)
+    return np.memmap(path, dtype, "r", start, (count,))
 
 
 class Tiles:
@@ -116,11 +119,14 @@ class Tiles:
         kind, size, self._start = stored_array(self.path, "data.npy")
         if ends.dtype.kind not in "iu" or kind != np.uint8:
             raise InputError(
-                f"{self.path}: data of {kind} parted by {ends.dtype}, expected bytes and whole numbers"
+                f"{self.path}: data of {kind} parted by {ends.dtype}, expected bytes and whole "
+                "numbers"
             )
-        if not len(ends) or ends[0] < 0 or (np.diff(ends) < 0).any() or ends[-1] != size:
+        rising = len(ends) and ends[0] >= 0 and (np.diff(ends) >= 0).all()
+        if not rising or ends[-1] != size:
             raise InputError(
-                f"{self.path}: offsets.npy does not part data.npy's {size} bytes, the file is damaged"
+                f"{self.path}: offsets.npy does not part data.npy's {size} bytes, the file is "
+                "damaged"
             )
         # Read instead of mapping: gigabytes of mapped pages would count as memory of this process.
         self._file = self.path.open("rb")
@@ -133,5 +139,6 @@ class Tiles:
         """Bytes of one PNG. Raises: IndexError for a number out of range."""
         if not 0 <= number < len(self):
             raise IndexError(number)
-        first, last = (int(self.offsets[number + step]) for step in (0, 1))
-        return os.pread(self._file.fileno(), last - first, self._start + first)
+        first = int(self.offsets[number])
+        size = int(self.offsets[number + 1]) - first
+        return os.pread(self._file.fileno(), size, self._start + first)

@@ -1,3 +1,4 @@
-"""The workflow's logic as functions: what runs, with which settings and source files. No data is
-computed here.
+"""The workflow's logic as functions: what runs, with which settings and source files.
+
+No data is computed here.
 """

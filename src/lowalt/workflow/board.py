@@ -1,5 +1,4 @@
 """Progress of a run, one line per stage: finished and total jobs, rate, time left, running jobs.
-Counts and text only.
 
 Times are seconds since the epoch, so that another process can read a board from a file.
 """
@@ -10,13 +9,12 @@ from dataclasses import asdict, dataclass, field
 from lowalt.machine.progress import Progress
 
 Reader = Callable[[str, float], Progress | None]
-"""Reads a job's progress from its log, given the job's start (s): an older log may be that of an
-earlier run.
-"""
+"""Reads a job's progress from its log, given its start (s): an older log is of an earlier run."""
 
-LEAST_PART = 0.1
-"""Progress of a job before the first estimate of the time left, because a job first imports and
-compiles code.
+LEAST_SHARE = 0.1
+"""Share of a job that is done before the first estimate of the time left.
+
+A job first imports and compiles code.
 """
 
 
@@ -32,9 +30,7 @@ class Job:
 
 @dataclass
 class Stage:
-    """Jobs of one rule: their number, how many are done, when the first started and the last ended
-    (s).
-    """
+    """Jobs of one rule: their number, how many are done or failed, first start and last end (s)."""
 
     total: int
     done: int = 0
@@ -67,7 +63,8 @@ class Board:
         """Record the start of a job; return whether it is the first of its stage."""
         new = job.stage not in self.stages
         stage = self.stages.setdefault(job.stage, Stage(self.totals.get(job.stage, 0)))
-        stage.started = job.started if stage.started is None else stage.started
+        if stage.started is None:
+            stage.started = job.started
         self.jobs[str(job_id)] = job
         return new
 
@@ -78,9 +75,13 @@ class Board:
             return None
         stage = self.stages[job.stage]
         stage.ended = now
-        stage.done = stage.done + good
-        stage.failed = stage.failed + (not good)
-        return job.stage if stage.done >= stage.total else None
+        if good:
+            stage.done += 1
+        else:
+            stage.failed += 1
+        if stage.done < stage.total:
+            return None
+        return job.stage
 
     def running(self) -> list[str]:
         """Return the stages with a running job, in order of their start."""
@@ -91,7 +92,8 @@ class Board:
         """Return the line of the whole run."""
         done = sum(stage.done for stage in self.stages.values())
         planned = sum(self.totals.values())
-        return f"{'all':<{self._width}} {done}/{planned} jobs, {span(now - self.started)} since the start"
+        spent = span(now - self.started)
+        return f"{'all':<{self._width}} {done}/{planned} jobs, {spent} since the start"
 
     @property
     def _width(self) -> int:
@@ -101,30 +103,37 @@ class Board:
     def line(self, name: str, now: float, read: Reader) -> str:
         """Return the line of one stage."""
         stage = self.stages[name]
-        head = f"{name:<{self._width}} {stage.done}/{stage.total}"
-        head += f", {stage.failed} failed" if stage.failed else ""
-        now_running = {key: job for key, job in self.jobs.items() if job.stage == name}
-        if not now_running and stage.done >= stage.total:
-            return f"{head}, done in {span(stage.ended - stage.started)}"
-        progress_of = {key: read(job.log, job.started) for key, job in now_running.items()}
-        parts = sum(
-            progress.done / progress.total
-            for progress in progress_of.values()
-            if progress and progress.total
-        )
-        done = stage.done + parts
-        spent = now - stage.started
-        if spent > 0 and (stage.done or parts >= LEAST_PART):
-            head += f", {pace(stage.done / spent)}" if stage.done else ""
-            head += f", {span((stage.total - done) * spent / done)} left"
-        texts = [_running(job, progress_of[key]) for key, job in now_running.items()]
-        return head + "".join(f"; {text}" for text in texts if text)
+        text = f"{name:<{self._width}} {stage.done}/{stage.total}"
+        if stage.failed:
+            text += f", {stage.failed} failed"
+        running = [job for job in self.jobs.values() if job.stage == name]
+        started = now if stage.started is None else stage.started
+        if not running and stage.done >= stage.total:
+            ended = now if stage.ended is None else stage.ended
+            return f"{text}, done in {span(ended - started)}"
+        shares = 0.0
+        of_jobs = ""
+        for job in running:
+            progress = read(job.log, job.started)
+            if progress and progress.total:
+                shares += progress.done / progress.total
+            words = _running(job, progress)
+            if words:
+                of_jobs += f"; {words}"
+        done = stage.done + shares
+        spent = now - started
+        if spent > 0 and (stage.done or shares >= LEAST_SHARE):
+            if stage.done:
+                text += f", {pace(stage.done / spent)}"
+            text += f", {span((stage.total - done) * spent / done)} left"
+        return text + of_jobs
 
 
 def _running(job: Job, progress: Progress | None) -> str:
     """Return the job's wildcards and, where its log tells, how much of it is done."""
-    parts = f"{progress.done}/{progress.total} {progress.unit}" if progress else ""
-    return f"{job.label} {parts}".strip()
+    if progress is None:
+        return job.label.strip()
+    return f"{job.label} {progress.done}/{progress.total} {progress.unit}".strip()
 
 
 def span(seconds: float) -> str:
@@ -133,14 +142,15 @@ def span(seconds: float) -> str:
     hours = whole // 3600
     minutes = whole // 60 % 60
     remainder = whole % 60
-    return f"{hours}:{minutes:02}:{remainder:02}" if hours else f"{minutes}:{remainder:02}"
+    if hours:
+        return f"{hours}:{minutes:02}:{remainder:02}"
+    return f"{minutes}:{remainder:02}"
 
 
 def pace(per_second: float) -> str:
-    """Return a rate in jobs per second, minute or hour: the first of these units that gives at
-    least one.
-    """
-    for factor, unit in ((1, "s"), (60, "min"), (3600, "h")):
-        if per_second * factor >= 1 or unit == "h":
-            return f"{per_second * factor:.1f}/{unit}"
-    raise AssertionError("the last unit always returns")
+    """Return a rate in jobs per second, minute or hour: the first unit that gives at least one."""
+    if per_second >= 1:
+        return f"{per_second:.1f}/s"
+    if per_second * 60 >= 1:
+        return f"{per_second * 60:.1f}/min"
+    return f"{per_second * 3600:.1f}/h"

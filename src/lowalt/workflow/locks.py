@@ -1,6 +1,6 @@
-"""Locks that end with their run: next to each pair of Snakemake's lock files, a record that the run
-holds locked.
+"""Locks that end with their run: a record next to each pair of Snakemake's lock files.
 
+The run holds the record locked.
 Snakemake locks a working directory with files, which remain when it is killed. The operating system
 releases a file lock when its holder ends for any reason. The next run can therefore remove the lock
 files of a dead run and end its orphaned jobs, and it refuses to start while another run is alive.
@@ -40,9 +40,7 @@ class Owner:
 
     @classmethod
     def read(cls, path: Path) -> "Owner | None":
-        """Return the owner that a file records, or None where the file is damaged, as after a power
-        loss.
-        """
+        """Return the owner that a file records, None for a damaged file, as after a power loss."""
         try:
             block = json.loads(path.read_text())
             return cls(block["pid"], block["host"], block["token"])
@@ -55,9 +53,7 @@ class Owner:
         return self.host == socket.gethostname()
 
     def left_behind(self) -> list[int]:
-        """Ids of processes on this machine with the owner's token; of a dead owner, its orphaned
-        jobs.
-        """
+        """Ids of processes here with the owner's token; of a dead owner, its orphaned jobs."""
         mark = f"{TOKEN}={self.token}".encode()
         jobs = []
         for folder in Path("/proc").glob("[0-9]*"):
@@ -94,20 +90,17 @@ def held(path: Path) -> bool:
 
 
 def drop(locks: Path, number: int) -> None:
-    """Remove one lock, the owner's record last, so that a crash in between leaves no lock without
-    an owner.
-    """
+    """Remove one lock, the owner's record last: a crash in between leaves no lock without owner."""
     for kind in KINDS:
         (locks / f"{number}.{kind}.lock").unlink(missing_ok=True)
     record(locks, number).unlink(missing_ok=True)
 
 
 def take_over(locks: Path, say: Callable[[str], None]) -> None:
-    """Remove the locks of dead owners on this host and end their orphaned jobs; call within
-    `guarded`.
+    """Remove the locks of dead owners on this host and end their orphaned jobs.
 
-    say: called with one sentence per removed lock. Locks of other hosts and locks without a record
-    stay.
+    Call within `guarded`. say: called with one sentence per removed lock. Locks of other hosts and
+    locks without a record stay.
     """
     for number in numbers(locks):
         owner = Owner.read(record(locks, number))
@@ -115,16 +108,14 @@ def take_over(locks: Path, say: Callable[[str], None]) -> None:
             continue
         ended = end(owner)
         drop(locks, number)
-        jobs = (
-            f", after ending its {len(ended)} processes that still ran ({ended})" if ended else ""
-        )
-        say(f"took over the lock of the dead process {owner.pid} of {owner.host}{jobs}")
+        sentence = f"took over the lock of the dead process {owner.pid} of {owner.host}"
+        if ended:
+            sentence += f", after ending its {len(ended)} processes that still ran ({ended})"
+        say(sentence)
 
 
 def end(owner: Owner) -> list[int]:
-    """End the orphaned processes of a dead run, which would write the next run's files; return
-    their ids.
-    """
+    """End the orphaned processes of a dead run, which would write files of the next; return ids."""
     ended = owner.left_behind()
     for number in (signal.SIGTERM, signal.SIGKILL):
         for pid in owner.left_behind():
@@ -142,17 +133,19 @@ def holders(locks: Path, living: bool = False) -> list[str]:
     for number in numbers(locks):
         path = record(locks, number)
         owner = Owner.read(path)
-        if owner and owner.here and held(path):
+        if owner is not None and owner.here and held(path):
             lines.append(f"process {owner.pid} of {owner.host} is running; wait for it or end it")
-        elif not living and owner is None:
+        elif living:
+            continue
+        elif owner is None:
             lines.append(
                 f"{locks / f'{number}.output.lock'}: no record of its owner in {path.name}"
             )
-        elif not living and not owner.here:
+        elif not owner.here:
             lines.append(
                 f"process {owner.pid} of host {owner.host}, which cannot be seen from here"
             )
-        elif not living:
+        else:
             lines.append(
                 f"process {owner.pid} of {owner.host} has died; the next run takes its lock over"
             )

@@ -1,6 +1,6 @@
-"""Workarounds for faults of Snakemake, its Slurm executor and `logging`, each with fault, cause,
-cure and versions.
+"""Workarounds for faults of Snakemake, its Slurm executor and `logging`.
 
+Each states fault, cause, cure and versions.
 `workflow/rules/common.smk` calls `install`, so that they apply to `make`, `lowalt run` and plain
 `snakemake`. For each a test shows that the installed version still has the fault. Those of numba
 stand in `machine/machine_code.py`.
@@ -20,12 +20,14 @@ from typing import Any
 from lowalt.config.command import refusing
 from lowalt.files.atomic import FULL
 from lowalt.files.errors import InputError
+from lowalt.machine.run_pipe import end_with_starter, hold_pipe
 from lowalt.workflow.locks import TOKEN, Owner, drop, guarded, holders, refusal, take, take_over
 
 
 def install() -> None:
     """Apply all workarounds to this process."""
     end_locks()
+    end_jobs()
     answer_ctrl_c()
     keep_one_timer()
     ask_slurm_sooner()
@@ -92,14 +94,30 @@ def _lock_warn_only(self: Any) -> Iterator[None]:
 
 
 def _cleanup_locks(self: Any) -> None:
-    """Remove all locks, as `--unlock` asks. Raises: SystemExit after one line that names a living
-    holder.
+    """Remove all locks, as `--unlock` asks.
+
+    Raises: SystemExit after one line that names a living holder.
     """
     with refusing(), guarded(Path(self.path)):
         alive = holders(Path(self._lockdir), living=True)
         if alive:
             raise InputError("not unlocked: " + "; ".join(alive))
         self.unlock()
+
+
+# Fault: jobs go on for minutes after SIGKILL of the run. No issue upstream.
+# Cause: nothing tells a job that Snakemake has ended. Held in: Snakemake 9.27.
+# Cure: jobs inherit a pipe that the system closes with the run; the run itself ends in this way with
+# the command `lowalt run`.
+
+
+def end_jobs() -> None:
+    """Let the jobs of this process end with it, and this process with `lowalt run`."""
+    from snakemake.shell import shell
+
+    if "pass_fds" not in shell._process_args:
+        end_with_starter()
+        shell._process_args["pass_fds"] = (hold_pipe(),)
 
 
 # Fault: a second Ctrl-C interrupts the clean-up of jobs and files, with tracebacks. No issue
@@ -123,8 +141,13 @@ def answer_ctrl_c() -> None:
 
 def _first(number: int, frame: FrameType | None) -> None:
     """Answer the next Ctrl-C, and raise KeyboardInterrupt for this one."""
-    signal.signal(signal.SIGINT, lambda number, frame: os.write(2, ANSWER) and None)
+    signal.signal(signal.SIGINT, _again)
     raise KeyboardInterrupt
+
+
+def _again(number: int, frame: FrameType | None) -> None:
+    """Answer a Ctrl-C after the first."""
+    os.write(2, ANSWER)
 
 
 # Fault: after n jobs Snakemake schedules n times a second.
@@ -175,14 +198,14 @@ def ask_slurm_sooner() -> None:
 
 
 def _slower(executor: Any, asked_s: float | None) -> None:
-    """Set the seconds until the next poll; the plugin asks for a longer wait than the last if no
-    job has finished.
+    """Set the seconds until the next poll.
+
+    The plugin asks for a longer wait than the last if no job has finished.
     """
     last_s = executor._next_seconds_between_status_checks
-    grown = last_s is not None and asked_s is not None and asked_s > last_s
-    executor._next_seconds_between_status_checks = (
-        min(GROWTH * last_s, max(MOST_S, last_s)) if grown else asked_s
-    )
+    if last_s is not None and asked_s is not None and asked_s > last_s:
+        asked_s = min(GROWTH * last_s, max(MOST_S, last_s))
+    executor._next_seconds_between_status_checks = asked_s
 
 
 # Fault: on a full disk every line of a log prints two tracebacks, although the run itself reports
@@ -194,7 +217,7 @@ def _slower(executor: Any, asked_s: float | None) -> None:
 
 def quiet_logs_on_a_full_disk() -> None:
     """Let log files be silent where their disk is full."""
-    logging.FileHandler.handleError = _quiet  # type: ignore[method-assign]
+    logging.FileHandler.handleError = _quiet  # type: ignore[method-assign, assignment]
 
 
 def _quiet(file: logging.FileHandler, record: logging.LogRecord) -> None:

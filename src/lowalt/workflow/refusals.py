@@ -1,5 +1,4 @@
-"""Checks that refuse a configuration whose values contradict each other, another run, or the
-existing files.
+"""Checks that refuse a configuration that contradicts itself, another run, or existing files.
 
 Each function raises InputError naming the key, its value and what was expected. `Run.of` calls them
 before any job.
@@ -10,6 +9,7 @@ import itertools
 from collections.abc import Collection
 from pathlib import Path
 
+from lowalt.config.brought import OF_TRAINING, refuse_brought
 from lowalt.config.classes import AIRBORNE, CATEGORIES
 from lowalt.config.layers import plain
 from lowalt.config.named_code import file_of, own_effects
@@ -55,8 +55,9 @@ def refuse_braces(config: dict, inputs: str | None) -> None:
 
 
 def refuse_scene(config: dict, network: Network, subtypes: Collection[str]) -> None:
-    """Refuse incompatible effects, effects that need subtypes which the run lacks, and added SNRs
-    whose noise the echoes would have to hold.
+    """Refuse effects that do not fit one another, the run's subtypes or added SNRs.
+
+    The noise of added SNRs must not be part of the echoes.
     """
     links = any(station.transmitter is not None for station in network.stations)
     if config["effects"] or links or network.guard_subcarriers < 0:
@@ -66,8 +67,8 @@ def refuse_scene(config: dict, network: Network, subtypes: Collection[str]) -> N
     noisy = in_all_cells(config["effects"])
     if adds_snrs and noisy:
         raise InputError(
-            f"added: snr_db together with effects.{noisy[0]}, whose echoes contain the noise of all "
-            "SNRs"
+            f"added: snr_db together with effects.{noisy[0]}, whose echoes contain the noise of "
+            "all SNRs"
         )
 
 
@@ -88,7 +89,8 @@ def refuse_contradictions(config: dict, published: dict, classes: tuple[str, ...
 
 def _refuse_ranges(key: str, ranges: dict, names: Collection[str], expected: str) -> None:
     """Refuse ranges (m) with an unknown name or with the larger value first."""
-    if unknown := sorted(set(ranges) - set(names)):
+    unknown = sorted(set(ranges) - set(names))
+    if unknown:
         raise InputError(f"{key}: {unknown}, expected {expected}")
     for name, (low, high) in ranges.items():
         if low > high:
@@ -103,15 +105,13 @@ def refuse_sizes(config: dict, classes: tuple[str, ...] = tuple(CATEGORIES)) -> 
     _refuse_ranges("motion.sizes_m", sizes, classes, f"some of the classes {list(classes)}")
     if sizes and config["effects"]:
         raise InputError(
-            f"motion.sizes_m: given together with effects {sorted(config['effects'])}, expected one "
-            "or the other"
+            f"motion.sizes_m: given together with effects {sorted(config['effects'])}, expected "
+            "one or the other"
         )
 
 
 def refuse_input(config: dict) -> None:
-    """Refuse an image cache for samples simulated on access, and recipe shards in scenes without
-    clean echoes.
-    """
+    """Refuse a cache of images simulated on access, and recipe shards without clean echoes."""
     if config["shards"]["kind"] == "recipe":
         refuse(config["effects"])
     block = config["recognition"]
@@ -120,6 +120,11 @@ def refuse_input(config: dict) -> None:
         raise InputError(
             f"recognition.input: 'dataset' together with the effects {own}, expected shards"
         )
+    if block.get("input") == "dataset":
+        # The jobs read the run's own config.yaml, which may be a stranger's for all they know.
+        unused = ("inputs", *OF_TRAINING)
+        used = {key: value for key, value in config.items() if key not in unused}
+        refuse_brought(used, "recognition.input: 'dataset'")
     if block.get("input") == "dataset" and block["cache"]:
         raise InputError(
             "recognition.input: 'dataset' together with recognition.cache true, expected cache: "
@@ -133,9 +138,7 @@ def shows_all_cells(config: dict) -> bool:
 
 
 def refuse_cells(config: dict) -> None:
-    """Refuse spectra of range cells with shards of signals, and `shards.cells` for shards other than
-    cubes.
-    """
+    """Refuse spectra of range cells with shards of signals, and `shards.cells` without cubes."""
     kind = config["shards"]["kind"]
     shown = of_cells(config["spectra"])
     cells = config["shards"].get("cells")
@@ -149,9 +152,7 @@ def refuse_cells(config: dict) -> None:
 
 
 def refuse_no_files(targets: dict, inputs: str | None) -> None:
-    """Refuse a folder with none of the named files if built-in models would silently replace them
-    all.
-    """
+    """Refuse a folder with no named file if built-in models would silently replace them all."""
     if targets.get("where_missing") != "builtin":
         return
     records = records_of({**targets, "where_missing": "refuse"})
@@ -166,17 +167,14 @@ def refuse_no_files(targets: dict, inputs: str | None) -> None:
 
 
 def refuse_heights(heights: dict, published: dict, classes: tuple[str, ...]) -> None:
-    """Refuse flight heights for names that are neither subtypes nor classes, and reversed ranges."""
+    """Refuse flight heights of names that are no subtypes or classes, and reversed ranges."""
     known = {*published, *classes, *CATEGORIES}
-    _refuse_ranges(
-        "motion.height_m", heights, known, f"subtypes, classes {list(classes)} or {list(AIRBORNE)}"
-    )
+    expected = f"subtypes, classes {list(classes)} or {list(AIRBORNE)}"
+    _refuse_ranges("motion.height_m", heights, known, expected)
 
 
 def refuse_data(config: dict) -> None:
-    """Refuse another run's data set if it or its images are missing, or if its settings differ from
-    these.
-    """
+    """Refuse another run's data set if it or its images are missing or its settings differ."""
     name = config.get("data", config["run"])
     if name == config["run"]:
         return
@@ -203,8 +201,9 @@ def refuse_data(config: dict) -> None:
 
 
 def refuse_missing(config: dict) -> None:
-    """Refuse a missing file or folder that the configuration names; some are needed only by the
-    last jobs.
+    """Refuse a missing file or folder that the configuration names.
+
+    Some are needed only by the last jobs.
     """
     network = config["recognition"]["network"]
     files = {
@@ -229,7 +228,9 @@ def refuse_missing(config: dict) -> None:
 def refuse_region(config: dict) -> None:
     """Refuse a region with zero area, given explicitly or spanned by the stations."""
     polygon = config["motion"]["region"]["polygon_m"]
-    corners = masts_m(config["network"]) if polygon is None else polygon
+    corners = polygon
+    if corners is None:
+        corners = masts_m(config["network"])
     sides = [(x - corners[0][0], y - corners[0][1]) for x, y in corners[1:]]
     parallel = all(a * d == b * c for (a, b), (c, d) in itertools.product(sides, repeat=2))
     if not parallel:
@@ -262,8 +263,9 @@ def refuse_speeds(config: dict) -> None:
 
 
 def _suited(config: dict, name: str) -> Scheme:
-    """Return a scheme of the table. Raises: InputError where this configuration lacks its stations
-    or spectra.
+    """Return a scheme of the table.
+
+    Raises: InputError where this configuration lacks its stations or spectra.
     """
     table = config["recognition"]["table"]
     stations = station_names(config["network"])
@@ -303,7 +305,7 @@ def schemes_of(config: dict) -> dict[str, Scheme]:
     trained = [schemes[name] for name in block["schemes"]]
     if len({scheme.name for scheme in trained}) < len(trained):
         raise InputError(f"recognition.schemes: {block['schemes']}, expected every scheme once")
-    offered = {protocol for scheme in trained for protocol in scheme.protocols}
+    offered = set(itertools.chain.from_iterable(scheme.protocols for scheme in trained))
     if not offered & set(block["protocols"]):
         raise InputError(
             f"recognition.protocols: {block['protocols']}, expected a protocol of one of "

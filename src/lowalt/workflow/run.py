@@ -1,9 +1,10 @@
-"""One run: the facts derived from its checked configuration. Other modules hold its files and its
-stages' settings.
+"""One run: the facts derived from its checked configuration.
 
-Every fault of a configuration is found here, before any job starts.
+Other modules hold its files and its stages' settings. Every fault of a configuration is found here,
+before any job starts.
 """
 
+import itertools
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -24,9 +25,9 @@ from lowalt.workflow import refusals
 
 @dataclass(frozen=True)
 class Run:
-    """Network, records, classes, plan and schemes of one run; `inputs` is the folder of the user's
-    files, or None.
+    """Network, records, classes, plan and schemes of one run.
 
+    inputs: the folder of the user's files, or None.
     The classes are those of the whole table of targets, so that labels do not depend on the
     selection of targets.
     """
@@ -52,7 +53,8 @@ class Run:
         published = {name: record["published"] for name, record in records.items()}
         classes = classes_of(published)
         plan = Plan.of(config, published)
-        chosen = {name: records[name] for members in plan.groups.values() for name in members}
+        subtypes = itertools.chain.from_iterable(plan.groups.values())
+        chosen = {name: records[name] for name in subtypes}
         network = Network.from_settings(config["network"])
         spectra = Spectra.from_settings(config["spectra"])
         spectra.check(network.symbols, len(network.stations), network.subcarriers)
@@ -61,16 +63,15 @@ class Run:
         schemes = refusals.schemes_of(config)
         refusals.refuse_scene(config, network, chosen)
         refusals.refuse_no_files(config["targets"], inputs)
-        if lacking := missing_inputs(chosen, inputs):
+        lacking = missing_inputs(chosen, inputs)
+        if lacking:
             raise InputError("missing inputs:\n  " + "\n  ".join(lacking))
         refusals.refuse_data(config)
         return cls(config, inputs, network, chosen, classes, plan, schemes)
 
     @property
     def sources(self) -> str:
-        """One line: the number of subtypes with built-in models, and the subtypes made from the
-        user's files.
-        """
+        """One line: the number of built-in subtypes, and the names of those from files."""
         named = [
             name for name, record in self.records.items() if record["source"] in ("mesh", "mocap")
         ]
@@ -92,9 +93,7 @@ class Run:
 
     @property
     def data(self) -> str:
-        """Name of the run whose data set is used for training: this run, unless the configuration
-        names another.
-        """
+        """Name of the run whose data set trains: this run, unless the configuration names one."""
         return self.config.get("data", self.name)
 
     @cached_property
@@ -120,7 +119,9 @@ class Run:
     def own_backbone(self, scheme: Scheme) -> str:
         """FILE.py:FUNCTION of a scheme's backbone, "" for a library's."""
         name = scheme.backbone_of(self.config["recognition"]["network"])
-        return name if ".py:" in name else ""
+        if ".py:" not in name:
+            return ""
+        return name
 
     @cached_property
     def trained(self) -> list[Scheme]:
@@ -131,13 +132,12 @@ class Run:
     def trainings(self) -> list[str]:
         """{protocol}/{scheme}/{training seed} of every training."""
         block = self.config["recognition"]
-        return [
-            f"{protocol}/{scheme.slug}/{seed}"
-            for scheme in self.trained
-            for protocol in block["protocols"]
-            if protocol in scheme.protocols
-            for seed in block["seeds"]
-        ]
+        names = []
+        for scheme in self.trained:
+            for protocol in block["protocols"]:
+                if protocol in scheme.protocols:
+                    names += [f"{protocol}/{scheme.slug}/{seed}" for seed in block["seeds"]]
+        return names
 
     @cached_property
     def gpus(self) -> int:
@@ -146,20 +146,19 @@ class Run:
 
     @cached_property
     def priced(self) -> list[str]:
-        """The trainings in the comparison of accuracy and cost: unseen protocol, all training
-        seeds.
-        """
-        seeds = self.config["recognition"]["seeds"]
-        return [f"unseen/{scheme.slug}/{seed}" for scheme in self.trained for seed in seeds]
+        """The trainings in the comparison of accuracy and cost: unseen protocol, all seeds."""
+        names = []
+        for scheme in self.trained:
+            for seed in self.config["recognition"]["seeds"]:
+                names.append(f"unseen/{scheme.slug}/{seed}")
+        return names
 
     def is_reduced(self, size: int) -> bool:
         """Whether the tiles stage reduces its images to this size; signal shards have no tiles."""
         return self.config["shards"]["kind"] == "image" and size in self.config["tiles"]["reduced"]
 
     def images_of_job(self, wildcards: Any) -> int:
-        """Number of images per sample in the scheme of a job; the training time is proportional to
-        it.
-        """
+        """Number of images per sample in the scheme of a job, which its time grows with."""
         return len(self.schemes_by_slug[wildcards.scheme].columns)
 
     @cached_property

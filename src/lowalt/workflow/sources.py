@@ -1,5 +1,4 @@
-"""The source files that a module uses: its transitive imports within the package, found by static
-analysis.
+"""The source files that a module uses: its transitive imports, found by static analysis.
 
 The workflow declares them as inputs of each stage, so editing a module re-runs the stages that use
 it.
@@ -8,7 +7,7 @@ it.
 import ast
 import functools
 import importlib.util
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from lowalt.config.extensions import offered
@@ -31,9 +30,10 @@ def _file(module: str) -> Path | None:
     """File of a module of the package or of an extension, None where there is none."""
     if module.split(".")[0] != PACKAGE.name:
         found = importlib.util.find_spec(module)
-        return (
-            Path(found.origin) if found and found.origin and found.origin.endswith(".py") else None
-        )
+        origin = found.origin if found else None
+        if origin is None or not origin.endswith(".py"):
+            return None
+        return Path(origin)
     base = ROOT.joinpath(*module.split("."))
     for path in (base / "__init__.py", base.with_suffix(".py")):
         if path.is_file():
@@ -42,8 +42,9 @@ def _file(module: str) -> Path | None:
 
 
 def _statements(body: list[ast.stmt]) -> Iterator[ast.stmt]:
-    """Yield every statement of a body and of the blocks inside it. Expressions, which are most
-    nodes, contain none.
+    """Yield every statement of a body and of the blocks inside it.
+
+    Expressions, which are most nodes, contain none.
     """
     for statement in body:
         yield statement
@@ -55,16 +56,18 @@ def _statements(body: list[ast.stmt]) -> Iterator[ast.stmt]:
 
 @functools.cache
 def _imports(path: Path, package: str = PACKAGE.name) -> tuple[str, ...]:
-    """Modules of lowalt, and of the file's own `package`, that a file imports: anywhere in the
-    file, but in a `__main__` only at top level.
+    """Modules of lowalt, and of the file's own `package`, that a file imports.
 
-    Imports within a function of a `__main__` belong to one subcommand; the caller names them. Those
-    within functions of the package's `__init__` serve users' attribute access, which no stage uses.
+    They may stand anywhere in the file, but in a `__main__` only at top level. Imports within a
+    function of a `__main__` belong to one subcommand; the caller names them. Those within functions
+    of the package's `__init__` serve users' attribute access, which no stage uses.
     """
     tree = ast.parse(path.read_bytes(), str(path))
     modules = []
-    deferred = path.name == "__main__.py" or path == PACKAGE / "__init__.py"
-    for node in tree.body if deferred else _statements(tree.body):
+    statements: Iterable[ast.stmt] = _statements(tree.body)
+    if path.name == "__main__.py" or path == PACKAGE / "__init__.py":
+        statements = tree.body
+    for node in statements:
         if isinstance(node, ast.Import):
             modules += [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom) and node.module:
@@ -83,8 +86,8 @@ def sources(*modules: str, spectra: tuple[str, ...] = ()) -> tuple[Path, ...]:
     modules the catalogue of spectra imports by name.
     Raises: ModuleNotFoundError where there is no such module.
     """
-    todo = []
-    seen = set()
+    todo: list[str] = []
+    seen: set[str] = set()
     paths = [Path(name) for name in modules if name.endswith(".py")]
     for path in paths:
         todo += _imports(path)
@@ -105,14 +108,15 @@ def sources(*modules: str, spectra: tuple[str, ...] = ()) -> tuple[Path, ...]:
         parent = name.rpartition(".")[0]
         if parent and package == PACKAGE.name:
             todo.append(parent)
-        todo += _imports(_file(name), package)
+        todo += _imports(file_of(name), package)
         if name == CATALOGUE:
             todo += [module_name(spectrum) for spectrum in spectra]
-        if name == EXTENSIONS:
+        # A core without its folder of extensions declares none.
+        if name == EXTENSIONS and _file(DECLARATION):
             todo.append(DECLARATION)
         if name == MESHES:
             todo += offered("meshes").values()
-    return tuple(sorted({*map(_file, seen), *(path.absolute() for path in paths)}))
+    return tuple(sorted({*map(file_of, seen), *(path.absolute() for path in paths)}))
 
 
 def file_of(module: str) -> Path:
@@ -124,14 +128,13 @@ def file_of(module: str) -> Path:
 
 
 def near(path: Path) -> str:
-    """Return a path relative to the working directory if it is below it, so that a checkout can be
-    moved.
-    """
-    here = Path.cwd()
-    return str(path.relative_to(here) if path.is_relative_to(here) else path)
+    """Return a path relative to the working directory if it is below, so a checkout can move."""
+    if path.is_relative_to(Path.cwd()):
+        return str(path.relative_to(Path.cwd()))
+    return str(path)
 
 
 @functools.cache
 def code(*modules: str, spectra: tuple[str, ...] = ()) -> tuple[str, ...]:
-    """Return `sources` of these modules as inputs of a rule: editing one re-runs the rule's jobs."""
+    """Return `sources` of these modules as inputs of a rule, whose jobs an edit re-runs."""
     return tuple(near(path) for path in sources(*modules, spectra=spectra))

@@ -25,9 +25,7 @@ SIGNAL_BYTES = 8
 
 
 def written(rule: str, wildcards: Mapping[str, str], plan: Plan, config: dict) -> float:
-    """Return the bytes that a job leaves; 0 for rules that leave little, or temporary files such as
-    tiles.
-    """
+    """Return the bytes that a job leaves; 0 where it leaves little, or temporary files."""
     if "part" not in wildcards:
         return 0.0
     chunk = plan.chunk(f"{wildcards['group']}-{wildcards['part']}")
@@ -35,7 +33,9 @@ def written(rule: str, wildcards: Mapping[str, str], plan: Plan, config: dict) -
     stations = len(config["network"]["stations"])
     values = models * stations * config["network"]["symbols"]
     if rule in ("echo", "echo_in_scene"):
-        return SIGNAL_BYTES * values / (stations if "station" in wildcards else 1)
+        if "station" in wildcards:
+            values = values / stations
+        return SIGNAL_BYTES * values
     if rule == "noise":
         return SIGNAL_BYTES * values * len(chunk.snrs)
     if rule not in ("shard", "views"):
@@ -48,10 +48,10 @@ def written(rule: str, wildcards: Mapping[str, str], plan: Plan, config: dict) -
 
 
 def cubes_size(config: dict, plan: Plan) -> dict:
-    """Return the size of a data set of cubes: number of `samples`, bytes per sample
-    (`sample_bytes`) and in all (`bytes`), and the type of its stored `cells`.
+    """Return the size of a data set of cubes; empty for shards of other kinds.
 
-    Empty for shards of other kinds.
+    Keys: number of `samples`, bytes per sample (`sample_bytes`) and in all (`bytes`), and the type
+    of the stored `cells`.
     """
     if config["shards"]["kind"] != "cube":
         return {}
@@ -74,8 +74,7 @@ def cubes_sentence(size: dict) -> str:
 
 
 def check(needed: float, folder: Path) -> None:
-    """Refuse a run whose files do not fit on the disk of a folder, unless the variable LOWALT_SPACE
-    is "off".
+    """Refuse a run whose files do not fit on a folder's disk, unless LOWALT_SPACE is "off".
 
     needed: bytes. Raises: SpaceError with both sizes; InputError where the variable has another
     value.
@@ -92,12 +91,12 @@ def check(needed: float, folder: Path) -> None:
 
 
 def before(workflow: Any, plan: Plan, config: dict) -> None:
-    """Print the size of cubes, and compare the bytes that a run will write with the free space,
-    before its first job.
+    """Before the first job, print the size of cubes and compare a run's bytes with the free space.
 
     Existing outputs are not counted. workflow: Snakemake's workflow object. Raises: as `check`.
     """
-    if size := cubes_size(config, plan):
+    size = cubes_size(config, plan)
+    if size:
         print(cubes_sentence(size), file=sys.stderr)
     needed = 0.0
     for job in workflow.dag.needrun_jobs():
@@ -109,9 +108,10 @@ def before(workflow: Any, plan: Plan, config: dict) -> None:
 
 
 def writable(folder: Path, run: str) -> None:
-    """Test writing: put an unnamed file of TRIAL_BYTES into the working directory, `results`, the
-    run's folder and its subfolders. In a full or read-only one Snakemake would end with a
-    traceback.
+    """Test writing: put an unnamed file of TRIAL_BYTES into each folder of a run.
+
+    These are the working directory, `results`, the run's folder and its subfolders. In a full or
+    read-only one Snakemake would end with a traceback.
 
     Raises: InputError with the reason and the free space if that fails, or if `results` is a
     dangling link.

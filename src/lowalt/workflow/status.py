@@ -17,13 +17,12 @@ from lowalt.workflow.board import Board, span
 
 FOLDER = Path(".snakemake/status")
 PLANNED_JOBS = "LOWALT_PLANNED_JOBS"
-"""Environment variable: file to which a dry run appends each job that would run, one JSON object
-per line.
-"""
+"""Environment variable: file to which a dry run appends a line of JSON per job that would run."""
 
 FRESH_S = 60.0
-"""Age (s) below which a state counts as current. A run writes every second, but clocks of other
-machines may differ.
+"""Age (s) below which a state counts as current.
+
+A run writes every second, but clocks of other machines may differ.
 """
 
 
@@ -48,12 +47,15 @@ def elsewhere(kept: dict) -> str:
     """Return the name of the machine that a run is on if it is another one, else an empty text."""
     here = socket.gethostname()
     host = kept.get("host", here)
-    return "" if host == here else host
+    if host == here:
+        return ""
+    return host
 
 
 def alive(kept: dict) -> bool:
-    """Return whether the process of a run is alive; on another machine, whether it wrote within the
-    last FRESH_S.
+    """Return whether the process of a run is alive.
+
+    On another machine it counts as alive if it wrote within the last FRESH_S.
     """
     if elsewhere(kept):
         return kept["state"] == "running" and time.time() - kept["written"] < FRESH_S
@@ -61,8 +63,9 @@ def alive(kept: dict) -> bool:
 
 
 def read(folder: Path = FOLDER) -> list[dict]:
-    """Return the stored states of all runs of a working directory, oldest first; damaged files are
-    skipped.
+    """Return the stored states of all runs of a working directory, oldest first.
+
+    Damaged files are skipped.
     """
     states = []
     for path in folder.glob("*.json"):
@@ -84,13 +87,13 @@ def describe(kept: dict, now: float) -> str:
     """Return the lines of one run."""
     board = Board.read(kept["board"])
     living = alive(kept)
-    state = (
-        kept["state"]
-        if living or kept["state"] != "running"
-        else "stopped unexpectedly, perhaps killed"
-    )
+    state = kept["state"]
+    if state == "running" and not living:
+        state = "stopped unexpectedly, perhaps killed"
+    process = f"process {kept['pid']}"
     host = elsewhere(kept)
-    process = f"process {kept['pid']} of {host}" if host else f"process {kept['pid']}"
+    if host:
+        process += f" of {host}"
     head = f"{process}: {state}, {span(now - kept['written'])} ago"
     moment = now if living else kept["written"]
     lines = [board.line(name, moment, progress.last) for name in board.stages]

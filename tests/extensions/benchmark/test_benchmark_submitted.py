@@ -80,6 +80,10 @@ def test_the_script_of_the_checks_refuses_a_table_that_the_files_do_not_give(tmp
 def test_a_wrong_submission_is_named(tmp_path):
     for name, card, sentence in (
         ("one", {"licence": ""}, r"card.yaml: missing \['licence'\]"),
+        ("five", {"method": "=cmd|' /C calc'!A0"}, r"card.yaml: method is .*, expected text that"),
+        ("six", {"method": "<script>alert(1)</script>"}, r"card.yaml: method is "),
+        ("seven", {"code": "@SUM(1)"}, r"card.yaml: code is "),
+        ("eight", {"chosen_on": "a\x1b[2J"}, r"card.yaml: chosen_on is "),
         ("two", {"colour": "red"}, r"unknown \['colour'\]"),
         ("three", {"confirmed": {"unseen": "88 %"}}, "confirmed.unseen is '88 %', expected what"),
     ):

@@ -7,6 +7,7 @@ import json
 import pickle
 import shutil
 from types import SimpleNamespace
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -83,9 +84,19 @@ def test_workers_that_are_forked_after_the_first_sample_do_not_share_its_connect
         (
             "index.json",
             (302, {"Location": "file:///etc/passwd"}),
-            "cannot be read .*file:///etc/passwd",
+            "the server leads to file:///etc/passwd, expected an address on the same host",
         ),
         ("index.json", (302, {"Location": "/index.json"}), "cannot be read .*redirects"),
+        (
+            "index.json",
+            (302, {"Location": "http://127.0.0.2/index.json"}),
+            "leads to http://127.0.0.2/index.json, expected an address on the same host",
+        ),
+        (
+            "index.json",
+            (307, {"Location": "http://127.0.0.1:9/index.json"}),
+            "leads to http://127.0.0.1:9/index.json, expected an address on the same host",
+        ),
         ("seen-test-00000.npz", (404, {}), r"/seen-test-00000\.npz: the server answers 404"),
         ("seen-test-00000.tar", (416, {}), r"/seen-test-00000\.tar: the server answers 416"),
         (
@@ -112,10 +123,10 @@ def test_a_server_that_is_not_there_is_refused(folder):
 
 def test_a_server_of_https_may_not_lead_to_one_of_http(monkeypatch):
     class Answer(contextlib.nullcontext):
-        """What a session returns after it has followed a redirect."""
+        """What a session returns for a redirect."""
 
-        url = "http://host/index.json"
-        status_code = 206
+        is_redirect = True
+        headers: ClassVar = {"Location": "http://host/index.json"}
 
     monkeypatch.setattr(
         web_files,

@@ -1,5 +1,6 @@
-"""Buildings as people tag and draw them: each is read as its tags say, or counted, or refused by
-its place.
+"""Buildings as people tag and draw them.
+
+Each is read as its tags say, or counted, or refused by its place.
 """
 
 import json

@@ -1,5 +1,6 @@
-"""A town: facets, blockage, reflections and diffraction against brute force, closed forms and the
-simpler effects.
+"""A town: facets, blockage, reflections and diffraction against slow truths.
+
+These are brute force, closed forms and the simpler effects.
 """
 
 import itertools
@@ -66,8 +67,9 @@ def test_direct_rays_are_blocked_as_by_every_triangle():
 
 
 def edge_field(nu, edge=0):
-    """The field behind a screen of whose edges (top, left, right) all but one are too far off for
-    any wave to pass.
+    """The field behind a screen of whose edges (top, left, right) all but one are far off.
+
+    No wave passes by them.
     """
     rows = np.full((3, len(nu)), 1e15)
     result = np.empty(len(nu), np.complex128)
@@ -77,8 +79,9 @@ def edge_field(nu, edge=0):
 
 
 def edge_nu(start, edge, ends):
-    """The parameter nu of an edge that a wave passes from start to ends (..., 3) m, by how much
-    longer its way is.
+    """The parameter nu of an edge that a wave passes from start to ends (..., 3) m.
+
+    It follows from how much longer its way is.
     """
     direct_m = np.linalg.norm(ends - start, axis=-1)
     detour_m = np.linalg.norm(edge - start) + np.linalg.norm(ends - edge, axis=-1) - direct_m
@@ -86,8 +89,9 @@ def edge_nu(start, edge, ends):
 
 
 def kirchhoff_sum(start, end, half_width_m, top_m):
-    """The field behind a screen x = 0, |y| < half_width_m, z < top_m, over that in free space: a
-    sum over its plane.
+    """The field behind a screen x = 0, |y| < half_width_m, z < top_m, over that in free space.
+
+    It is a sum over the screen's plane.
 
     The screen fades out far below its top, where a sharp end would diffract.
     """
@@ -110,8 +114,9 @@ def kirchhoff_sum(start, end, half_width_m, top_m):
 
 
 def reference_paths(scene, mast, place, order):
-    """Every path of 1 to `order` facets to one place: images of the mast, each leg against every
-    triangle.
+    """Every path of 1 to `order` facets to one place.
+
+    They are images of the mast, and each leg is tested against every triangle.
     """
     facets = scene.facets
     corners = [facets.triangles[a:b] for a, b in itertools.pairwise(facets.first)]
@@ -230,8 +235,9 @@ def test_paths_of_many_points_are_those_of_each():
 
 
 def test_one_wall_and_the_ground_are_the_simpler_effects(tmp_path):
-    """The ground's law is that of `ground_reflection`; the wall's is that of `walls` where rays are
-    level.
+    """The ground's law is that of `ground_reflection`.
+
+    The wall's is that of `walls` where rays are level.
     """
     rng = np.random.default_rng(4)
     places = np.array([60.0, 25.0, 10.0]) + rng.uniform(-1, 1, (24, 9, 3))
@@ -525,8 +531,9 @@ def test_a_strangers_folder_may_not_name_a_file_of_buildings():
 
 
 def test_a_blocked_target_is_weaker_and_its_paths_add(tmp_path):
-    """Far buildings change nothing, a wall hides, and the ground of a town is that of
-    `ground_reflection`.
+    """Far buildings change nothing, and a wall hides.
+
+    The ground of a town is that of `ground_reflection`.
     """
     cloud, row = target(np.random.default_rng(5))
     alone = ply(tmp_path / "far.ply", [(900.0, 900.0, 9.0, 9.0, 9.0)])

@@ -1,5 +1,7 @@
-"""A town's laws against numbers worked out by hand: two bounces between parallel walls, every
-material, and buildings as files state them.
+"""A town's laws against numbers worked out by hand.
+
+They are of two bounces between parallel walls, of every material, and of buildings as files state
+them.
 """
 
 import json
@@ -53,8 +55,9 @@ def test_a_lossy_wall_s_permittivity_has_the_imaginary_part_of_the_recommendatio
 
 
 def test_two_bounces_between_parallel_walls_move_the_images_by_twice_the_street():
-    """A street 30 m wide, its facades at x = 0 and x = 30: images lie 60 m away, on the side of the
-    last wall seen.
+    """A street 30 m wide, its facades at x = 0 and x = 30.
+
+    Images lie 60 m away, on the side of the last wall seen.
     """
     corners = np.concatenate(
         [block(-1.0, 0.0, 2.0, 400.0, 60.0), block(31.0, 0.0, 2.0, 400.0, 60.0)]

@@ -1,3 +1,1 @@
-"""The fast kernel: short polynomials replace functions, the strongest cell is proved, errors are
-bounded beforehand.
-"""
+"""The fast kernel: polynomials replace functions, strongest cells and error bounds are proved."""

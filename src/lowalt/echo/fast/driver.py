@@ -1,5 +1,4 @@
-"""Driver of the fast kernel: loops over segments of symbols and strips of points, and proves the
-strongest cells.
+"""Driver of the fast kernel: it loops over segments and strips, and proves the strongest cells.
 
 All smooth factors are evaluated as the plan's polynomials, in the loops of `vector_loops`. The code
 is compiled without reference counting, which took a quarter of the time, so nothing here may
@@ -11,7 +10,7 @@ import math
 import numpy as np
 
 from lowalt.echo.fast import vector_loops
-from lowalt.echo.fast.cell_kernel import PLACES, SIDE
+from lowalt.echo.fast.cell_kernel import POSITIONS, SIDE
 from lowalt.echo.fast.error_model import SINGLE_BLOCK
 from lowalt.echo.fast.range_bounds import END, MEAN, SIZE, SPREAD, START
 from lowalt.echo.fast.segment import constants, fill_offsets, fit_gains
@@ -24,8 +23,9 @@ from lowalt.machine.jit import INLINED, LEAN
 
 @INLINED
 def add_moments(strip, size, block, moments):
-    """Add the strip's moments to moments (2, orders), orders a multiple of four, `block` points at
-    a time.
+    """Add the strip's moments to moments (2, orders), `block` points at a time.
+
+    orders: a multiple of four.
     """
     for at in range(0, size, block):
         many = min(block, size - at)
@@ -43,8 +43,9 @@ def add_moments(strip, size, block, moments):
 
 @INLINED
 def add_amplitudes(strip, share, point, plan, size):
-    """Fill the strip's amplitudes by polynomials of the plan's degree; returns sums of |z| and of
-    |z| v^2.
+    """Fill the strip's amplitudes by polynomials of the plan's degree.
+
+    Returns sums of |z| and of |z| v^2.
     """
     c = plan.cosine
     s = plan.sine
@@ -78,17 +79,21 @@ def add_amplitudes(strip, share, point, plan, size):
 
 @INLINED
 def sum_points(sample, n, r, constants, degrees, plan, block, work):
-    """Fill work.moments with symbol n's moments divided by lay.total / r^2; return so divided sums
-    of |z| and |z| v^2.
+    """Fill work.moments with symbol n's moments, all divided by lay.total / r^2.
+
+    Returns the sums of |z| and of |z| v^2, divided alike.
 
     r: the reference's range (m); constants: of `segment.constants`; degrees: of the gains'
     polynomials; block: most points added in the strip's type.
     """
-    strip, offsets, (geometry, placing) = work.strip, work.offsets, constants
+    geometry, placing = constants
+    strip = work.strip
+    offsets = work.offsets
     padded = len(work.share)
     length = strip_size(padded)
     for order in range(work.moments.shape[1]):
-        work.moments[0, order], work.moments[1, order] = 0.0, 0.0
+        work.moments[0, order] = 0.0
+        work.moments[1, order] = 0.0
     total = 0.0
     second = 0.0
     for point in range(0, padded, length):
@@ -106,15 +111,20 @@ def sum_points(sample, n, r, constants, degrees, plan, block, work):
 
 @INLINED
 def precision(plan, padded, orders):
-    """Return (unit rounding of the strip's type, most points added in it, relative rounding of a
-    moment).
+    """Return (unit rounding, block, relative rounding of a moment) of the strip's type.
+
+    The block is the largest number of points added in that type.
 
     A moment of order k takes 3 k + 1 roundings of a power and its argument, one of the product, and
     those of the sums.
     """
-    unit = 2.0**-24 if plan.single else 2.0**-53
-    block = SINGLE_BLOCK if plan.single else STRIP
-    return unit, block, unit * (min(block, strip_size(padded)) + 3 * orders + 4 + padded / 2**20)
+    unit = 2.0**-53
+    block = STRIP
+    if plan.single:
+        unit = 2.0**-24
+        block = SINGLE_BLOCK
+    roundings = min(block, strip_size(padded)) + 3 * orders + 4 + padded / 2**20
+    return unit, block, unit * roundings
 
 
 @LEAN
@@ -150,11 +160,11 @@ def run(sample, symbols, approximation, final, work, found):
         for i in range(start, end):
             n = symbols.index[i]
             r = refs[i, RANGE]
-            place = max(0, min(int(np.rint((refs[i, REST] + 0.5) * PLACES)), PLACES))
-            placed = constants(sample, refs[i], segment, place / PLACES - 0.5, half)
-            total, second = sum_points(
-                sample, n, r, placed, (degree_h, degree_v), plan, block, work
-            )
+            nearest = int(np.rint((refs[i, REST] + 0.5) * POSITIONS))
+            position = max(0, min(nearest, POSITIONS))
+            fixed = constants(sample, refs[i], segment, position / POSITIONS - 0.5, half)
+            degrees = (degree_h, degree_v)
+            total, second = sum_points(sample, n, r, fixed, degrees, plan, block, work)
             # Undo the division by the sum of amplitudes, which keeps float32 from overflow and
             # underflow.
             scale = sample.lay.total / (r * r)
@@ -172,10 +182,11 @@ def run(sample, symbols, approximation, final, work, found):
             )
             bound = total * (plan.share + table.error) + summed + peaks * (plan.peak + gains)
             bound += plan.phase * min(total * extents[i, SIZE], peaks * extents[i, MEAN])
-            found.totals[n], found.bounds[n] = total, bound
+            found.totals[n] = total
+            found.bounds[n] = bound
             state, row, tie, lead = certify(
                 table,
-                place,
+                position,
                 extents[i, SIZE] * radar.cells,
                 (total, second),
                 table.error + 4.0 * rounding * (sizes[0] + sizes[1] + sizes[2]),
@@ -187,15 +198,8 @@ def run(sample, symbols, approximation, final, work, found):
                 state = UNCERTAIN
             found.state[n] = state
             if state == CERTAIN:
-                keep(
-                    found,
-                    n,
-                    int(refs[i, CELL]) + row - SIDE,
-                    work.sums[row],
-                    radar.subcarriers,
-                    tie,
-                    lead,
-                )
+                cell = int(refs[i, CELL]) + row - SIDE
+                keep(found, n, cell, work.sums[row], radar.subcarriers, tie, lead)
 
 
 @INLINED
@@ -203,8 +207,9 @@ def keep(found, n, cell, value, subcarriers, tie, lead):
     """Write symbol n's strongest cell into `found`.
 
     cell: its number before reduction modulo M; value: its real and imaginary part before the cell's
-    phase factor;
-    tie, lead: as returned by `strongest_cell.certify`.
+    phase factor; tie, lead: as returned by `strongest_cell.certify`.
     """
     found.values[n] = complex(value[0], value[1]) * cell_phase(cell, subcarriers)
-    found.cells[n], found.ties[n], found.gaps[n] = cell % subcarriers, tie, max(lead, 0.0)
+    found.cells[n] = cell % subcarriers
+    found.ties[n] = tie
+    found.gaps[n] = max(lead, 0.0)

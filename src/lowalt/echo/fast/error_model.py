@@ -1,6 +1,4 @@
-"""Selects precision and polynomials for a sample: the cheapest ones whose proved error bound is
-small enough.
-"""
+"""Selects precision and polynomials for a sample: the cheapest with a small enough proved error."""
 
 import math
 from typing import NamedTuple
@@ -11,19 +9,22 @@ from lowalt.echo.fast.polynomials import CosineSum, array_rule, smooth
 from lowalt.echo.radar import Radar
 
 SPREAD_LIMIT = 0.22
-"""Largest ratio of target radius to range for the fast kernel; closer targets use the pointwise
-kernel.
+"""Largest ratio of target radius to range for the fast kernel.
+
+Closer targets use the pointwise kernel.
 """
 FINEST = 1e-15
 """Required accuracy of every polynomial in exact mode."""
 
 
 class EchoPlan(NamedTuple):
-    """How to compute a sample. `fit`: error of gains and cell kernels; `share`, `peak`: bound of
-    the other errors, relative to the sum of amplitudes and to the sum of peak amplitudes; `phase`:
-    rounding of the phase relative to the sum of amplitudes times distances from the reference, per
-    metre; `single`: float32 after the phase; `cosine`, `sine`: coefficients of `polynomials.smooth`
-    in the type of the sums."""
+    """How to compute a sample.
+
+    `fit`: error of gains and cell kernels; `share`, `peak`: bound of the other errors, relative to
+    the sum of amplitudes and to the sum of peak amplitudes; `phase`: rounding of the phase relative
+    to the sum of amplitudes times distances from the reference, per metre; `single`: float32 after
+    the phase; `cosine`, `sine`: coefficients of `polynomials.smooth` in the type of the sums.
+    """
 
     fit: float
     share: float
@@ -44,12 +45,14 @@ class ArrayGains(NamedTuple):
 COSINE_DEGREES = (5, 7, 10)
 """Degrees in t^2 of cosine and sine that `vector_loops` has loops for."""
 SINGLE_BLOCK = 128
-"""Largest number of float32 values summed before continuing in double; longer sums exceed a
-tolerance of 1e-4.
+"""Largest number of float32 values summed before continuing in double.
+
+Longer sums exceed a tolerance of 1e-4.
 """
 SINGLE_ERROR = 400 * 2.0**-24
-"""Error bound of float32 after the phase reduction; float32 is not used if a smaller error is
-required.
+"""Error bound of float32 after the phase reduction.
+
+The type float32 is not used if a smaller error is required.
 """
 
 
@@ -62,8 +65,9 @@ def array_gains(radar: Radar) -> ArrayGains:
 
 
 def round_up(value: float, steps: int = 2) -> float:
-    """Return `value` rounded up to one of `steps` values an octave, so that few polynomials serve
-    all samples.
+    """Return `value` rounded up to one of `steps` values an octave.
+
+    Few polynomials then serve all samples.
     """
     return 2.0 ** (math.ceil(steps * math.log2(max(value, 1e-9))) / steps)
 
@@ -78,8 +82,12 @@ def echo_plan(radar: Radar, points: int, error: float) -> EchoPlan:
     elements = radar.transmit_h + radar.receive_h + radar.transmit_v + radar.receive_v
     array_phase = np.pi * radar.kappa / 2 * (elements - 4)
     unit = 2.0**-53
+    coarse = unit
+    kind: type = np.float64
     single = error > SINGLE_ERROR
-    coarse, kind = (2.0**-24, np.float32) if single else (unit, np.float64)
+    if single:
+        coarse = 2.0**-24
+        kind = np.float32
     for degree in COSINE_DEGREES:
         cosine, cosine_error = smooth("cosine", degree)
         sine, sine_error = smooth("sine", degree)
@@ -90,25 +98,28 @@ def echo_plan(radar: Radar, points: int, error: float) -> EchoPlan:
     rounding = (8 * array_phase + 30) * unit + (85 + 16) * coarse + -(-points // 512) * unit
     share = cosine_error + 0.5 * sine_error + rounding
     return EchoPlan(
-        max(error / 6, FINEST),
-        share,
-        8 * array_phase * unit,
-        64 * np.pi * radar.turns * unit,
-        single,
-        cosine.astype(kind),
-        sine.astype(kind),
+        fit=max(error / 6, FINEST),
+        share=share,
+        peak=8 * array_phase * unit,
+        phase=64 * np.pi * radar.turns * unit,
+        single=single,
+        cosine=cosine.astype(kind),
+        sine=sine.astype(kind),
     )
 
 
 def pointwise_bound(radar: Radar, size_m: float, points: int) -> tuple[float, float]:
-    """Return the pointwise kernel's error bound relative to its sums of amplitudes and of risks
-    (`terms.terms`).
+    """Return the error bound of the pointwise kernel.
+
+    It is relative to that kernel's sums of amplitudes and of risks (`terms.terms`).
 
     Phase: a range difference has a few roundings of the offset, independent of the range; the other
     errors come from sums. Risk: effect of the rounding of a direction cosine on the gains and the
     array phase.
     """
     elements = radar.transmit_h + radar.receive_h + radar.transmit_v + radar.receive_v
+    unit = 2.0**-53
     wave = 2 * np.pi * radar.turns * 2 * size_m
-    share = (20 * wave + 200 + points) * 2.0**-53
-    return float(share), float(40 * (1 + np.pi * radar.kappa / 2 * (elements - 4)) * 2.0**-53)
+    of_amplitudes = (20 * wave + 200 + points) * unit
+    of_risks = 40 * (1 + np.pi * radar.kappa / 2 * (elements - 4)) * unit
+    return float(of_amplitudes), float(of_risks)

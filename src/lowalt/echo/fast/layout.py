@@ -1,5 +1,6 @@
-"""Memory layout of the points for the fast kernel: sorted by part, one array per coordinate, padded
-to full vectors.
+"""Memory layout of the points for the fast kernel.
+
+They are sorted by part, one array per coordinate, padded to full vectors.
 """
 
 import math
@@ -32,8 +33,9 @@ class Groups(NamedTuple):
 
 
 class Layout(NamedTuple):
-    """Points sorted by part. Without rotations every point is its own part, and its translation is
-    its position.
+    """Points sorted by part.
+
+    Without rotations every point is its own part, and its translation is its position.
 
     coordinates: x, y, z (L + MULTIPLE,) m in the frame of the point's part, zero beyond the last
     point; amplitude: (padded L,) sqrt(rcs) times the radar's scale and the arrays' peak gain, zero
@@ -65,8 +67,9 @@ class EchoSample(NamedTuple):
 
 @LEAN
 def _group(points, part, share, strip, coordinates, groups):
-    """Copy the points by coordinate, split them into groups within one part, and return the number
-    of groups.
+    """Copy the points by coordinate, split them into groups within one part.
+
+    Returns the number of groups.
     """
     x, y, z = coordinates
     starts = groups.starts
@@ -118,27 +121,39 @@ def layout(scene: EchoInput, peak: float) -> Layout:
         part = part[order]
         root = root[order]
         rcs = rcs[order]
-    amplitude, padded_root, padded_rcs = np.zeros((3, max(-(-count // MULTIPLE), 1) * MULTIPLE))
+    padded = max(-(-count // MULTIPLE), 1) * MULTIPLE
+    amplitude, padded_root, padded_rcs = np.zeros((3, padded))
     amplitude[:count] = root * peak
     padded_root[:count] = root
     padded_rcs[:count] = rcs
     total = float(amplitude.sum())
-    share = amplitude / total if total > 0 else amplitude
-    room = count if rigid else 0
+    share = amplitude
+    if total > 0:
+        share = amplitude / total
+    # Without rotations there are no groups, and the weights are those of all points.
+    room = 0
+    if rigid:
+        room = count
     groups = Groups(
-        np.zeros(room, np.int64),
-        np.zeros(room + 1, np.int64),
-        np.empty((room, 3)),
-        *np.empty((3, room)),
+        parts=np.zeros(room, np.int64),
+        starts=np.zeros(room + 1, np.int64),
+        centres=np.empty((room, 3)),
+        radii=np.empty(room),
+        weights=np.empty(room),
+        strays=np.empty(room),
     )
     # Loops process MULTIPLE points at a time, so the arrays extend beyond the last point.
     x, y, z = np.zeros((3, room + MULTIPLE))
-    number = 0
     if rigid:
-        number = _group(points, part, share, strip_size(len(amplitude)), (x, y, z), groups)
-    groups = Groups(
-        *(array[: number + (name == "starts")] for name, array in groups._asdict().items())
-    )
-    if not rigid:
+        number = _group(points, part, share, strip_size(padded), (x, y, z), groups)
+        groups = Groups(
+            parts=groups.parts[:number],
+            starts=groups.starts[: number + 1],
+            centres=groups.centres[:number],
+            radii=groups.radii[:number],
+            weights=groups.weights[:number],
+            strays=groups.strays[:number],
+        )
+    else:
         groups = groups._replace(weights=share[:count])
     return Layout((x, y, z), groups, amplitude, total, padded_root, padded_rcs)

@@ -29,8 +29,9 @@ class CosineSum(NamedTuple):
 
 @LEAN
 def tail(band, degree):
-    """Return a bound of the error of `economised` for cosines with weights of sum 1 and phases up
-    to `band` (rad).
+    """Return a bound of the error of `economised`.
+
+    The cosines have weights of sum 1 and phases up to `band` (rad).
     """
     half = 0.5 * band
     term = 4.0
@@ -57,8 +58,10 @@ def degree_for(band, error):
 
 @lru_cache(maxsize=1)
 def folding() -> np.ndarray:
-    """Return weights (TOP + 1, EXTRA, TOP + 1): row d, j holds x^(d + 1 + j) on [-1, 1], its
-    Chebyshev series cut after T_d, as powers of x."""
+    """Return the weights (TOP + 1, EXTRA, TOP + 1) by which `economised` folds high powers back.
+
+    Row d, j holds x^(d + 1 + j) on [-1, 1], its Chebyshev series cut after T_d, as powers of x.
+    """
     top = TOP + EXTRA + 1
     # Powers to Chebyshev polynomials by x T_n = (T_{n+1} + T_{|n-1|}) / 2, and back by T_{n+1} = 2
     # x T_n - T_{n-1}.
@@ -99,7 +102,10 @@ def economised(cosines, centre, half, degree, fold, room, out):
     out[:] = 0.0
     for p in range(degree + EXTRA + 1):
         value = 0.0
-        sign = -1.0 if p & 2 else 1.0
+        # The signs of a cosine's Taylor series are +, -, -, +.
+        sign = 1.0
+        if p & 2:
+            sign = -1.0
         step = half / (p + 1)
         if p & 1:
             for i in range(count):
@@ -130,16 +136,23 @@ def _half(weights: np.ndarray, rates: np.ndarray) -> CosineSum:
     return CosineSum(weights, np.ascontiguousarray(rates[:keep]))
 
 
+MOST_RATES = 32
+"""Largest number of rates of a `cell_rule`."""
+CELL_REACH = 7.0
+"""Distance (cells) up to which `cell_rule` holds."""
+
+
 @lru_cache(maxsize=64)
 def cell_rule(count: int) -> CosineSum:
-    """Return a short cosine sum (rates in rad per cell) equal to the cell kernel of `count`
-    subcarriers.
+    """Return a short cosine sum equal to the cell kernel of `count` subcarriers.
+
+    Its rates are in rad per cell.
 
     This is the Gauss rule of the uniform discrete measure on the subcarriers (recurrence of the
     discrete Chebyshev polynomials). 32 nodes are exact to degree 63, with an error below 1e-17 at a
     distance of seven cells.
     """
-    nodes = min(count, 32)
+    nodes = min(count, MOST_RATES)
     k = np.arange(1, nodes)
     off = np.sqrt(k**2 * (count**2 - k**2) / (4.0 * (4.0 * k**2 - 1.0)))
     values, vectors = np.linalg.eigh(np.diag(off, 1) + np.diag(off, -1))
@@ -147,14 +160,11 @@ def cell_rule(count: int) -> CosineSum:
     return _half(weights / weights.sum(), 2 * np.pi / count * values)
 
 
-CELL_REACH = 7.0
-"""Distance (cells) up to which `cell_rule` holds."""
-
-
 @lru_cache(maxsize=64)
 def array_rule(transmit: int, receive: int, kappa: float) -> CosineSum:
-    """Return U_{T-1} U_{R-1} / (T R) as a cosine sum: weights of sum 1, rates in rad per unit of
-    direction cosine.
+    """Return U_{T-1} U_{R-1} / (T R) as a cosine sum.
+
+    Weights of sum 1, rates in rad per unit of direction cosine.
     """
     weights = np.convolve(np.ones(transmit), np.ones(receive)) / (transmit * receive)
     top = transmit + receive - 2
@@ -163,8 +173,9 @@ def array_rule(transmit: int, receive: int, kappa: float) -> CosineSum:
 
 @lru_cache(maxsize=1)
 def _nodes() -> tuple[np.ndarray, np.ndarray]:
-    """Return the 96 Chebyshev nodes on [-1, 1] and the matrix (96, 96) from values there to
-    Chebyshev coefficients.
+    """Return the Chebyshev nodes on [-1, 1] and the matrix from values there to coefficients.
+
+    There are 96 nodes, so the matrix is (96, 96).
 
     Computed in extended precision if the machine has it, because the rounding of a double-precision
     transform would look like coefficients.
@@ -178,18 +189,22 @@ def _nodes() -> tuple[np.ndarray, np.ndarray]:
 
 @lru_cache(maxsize=2)
 def _expansion(kind: str) -> tuple[np.ndarray, np.ndarray]:
-    """Return the Chebyshev coefficients (96,) of a function of `smooth`, and the error of stopping
-    at each degree.
+    """Return the Chebyshev coefficients (96,) of a function of `smooth`.
+
+    The error of stopping at each degree comes second.
     """
     s, matrix = _nodes()
-    turn = 8 * np.arctan(np.longdouble(1)) * np.sqrt((1 + s) / 8)
-    value = (
-        np.cos(turn) if kind == "cosine" else 8 * np.arctan(np.longdouble(1)) * np.sin(turn) / turn
-    )
+    two_pi = 8 * np.arctan(np.longdouble(1))
+    angle = two_pi * np.sqrt((1 + s) / 8)
+    value = np.cos(angle)
+    if kind == "sine":
+        value = two_pi * np.sin(angle) / angle
     coefficients = matrix @ value
     noise = max(64 * float(np.finfo(np.longdouble).eps), 1e-17) * float(abs(coefficients).max())
     size = np.where(abs(coefficients) < noise, 0, abs(coefficients)).astype(np.float64)
-    return coefficients, np.append(np.cumsum(size[::-1])[::-1][1:], 0.0) + 2e-16
+    from_here_on = np.cumsum(size[::-1])[::-1]
+    left_out = np.append(from_here_on[1:], 0.0)
+    return coefficients, left_out + 2e-16
 
 
 @lru_cache(maxsize=64)

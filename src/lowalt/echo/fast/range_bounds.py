@@ -1,6 +1,4 @@
-"""Bounds of the points' positions at every symbol, from the poses of the parts alone, before any
-point is computed.
-"""
+"""Bounds of the points' positions at every symbol, from the poses of the parts alone."""
 
 import math
 
@@ -10,15 +8,19 @@ from lowalt.echo.pointwise.reference_range import RANGE, X, Y, Z
 from lowalt.machine.jit import LEAN
 
 PSI, OMEGA, SPREAD, SIZE, MEAN = range(5)
-"""Columns of the table of extents: two direction cosines of the reference; the largest distance of
-a point from the reference, relative to the range and in metres; and a bound of the
-amplitude-weighted mean distance (m)."""
+"""Columns of the table of extents.
+
+They are two direction cosines of the reference; the largest distance of a point from the reference,
+relative to the range and in metres; and a bound of the amplitude-weighted mean distance (m).
+"""
 START, END, PSI_CENTRE, PSI_HALF, OMEGA_CENTRE, OMEGA_HALF = range(6)
-"""Columns of the table of segments: first symbol, end, centre and half-width of the points'
-direction cosines.
+"""Columns of the table of segments.
+
+They are the first symbol, the end, and centre and half-width of the points' direction cosines.
 """
 DRIFT = 1.0
-"""Radians of gain phase by which a segment may be wider than the target."""
+WIDER = 1.2
+"""Radians of gain phase, and factor, by which a segment may be wider than the target."""
 
 
 @LEAN
@@ -61,48 +63,57 @@ def fill_extents(sample, refs, out):
                 x += rotation[n, p, 0, 0] * a + rotation[n, p, 0, 1] * b + rotation[n, p, 0, 2] * c
                 y += rotation[n, p, 1, 0] * a + rotation[n, p, 1, 1] * b + rotation[n, p, 1, 2] * c
                 z += rotation[n, p, 2, 0] * a + rotation[n, p, 2, 1] * b + rotation[n, p, 2, 2] * c
-                bound = norm(rotation, n, p) if radii[group] > 0.0 else 0.0
+                bound = 0.0
+                if radii[group] > 0.0:
+                    bound = norm(rotation, n, p)
                 away = math.sqrt(x * x + y * y + z * z)
                 size = max(size, away + bound * radii[group])
                 mean += groups.weights[group] * away + bound * groups.strays[group]
         size *= 1.0 + 1e-12
-        out[n, PSI] = (radar.cosine * refs[n, Y] - radar.sine * refs[n, X]) / r if r > 0.0 else 0.0
-        out[n, OMEGA] = refs[n, Z] / r if r > 0.0 else 0.0
-        out[n, SPREAD] = size / r if r > 0.0 else np.inf
-        out[n, SIZE], out[n, MEAN] = size, mean * (1.0 + 1e-12)
+        out[n, PSI] = 0.0
+        out[n, OMEGA] = 0.0
+        out[n, SPREAD] = np.inf
+        if r > 0.0:
+            out[n, PSI] = (radar.cosine * refs[n, Y] - radar.sine * refs[n, X]) / r
+            out[n, OMEGA] = refs[n, Z] / r
+            out[n, SPREAD] = size / r
+        out[n, SIZE] = size
+        out[n, MEAN] = mean * (1.0 + 1e-12)
         worst = max(worst, out[n, SPREAD])
     return worst
 
 
 @LEAN
 def norm(rotation, n, p):
-    """Return a bound of the norm of rotation[n, p]: sqrt of the largest row sum of |m m^T| (1 for a
-    rotation).
+    """Return a bound of the norm of rotation[n, p], 1 for a rotation.
+
+    It is the square root of the largest row sum of |m m^T|.
     """
-    rows = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    xx = 0.0
+    yy = 0.0
+    zz = 0.0
+    xy = 0.0
+    xz = 0.0
+    yz = 0.0
     for j in range(3):
-        x, y, z = rotation[n, p, 0, j], rotation[n, p, 1, j], rotation[n, p, 2, j]
-        rows = (
-            rows[0] + x * x,
-            rows[1] + y * y,
-            rows[2] + z * z,
-            rows[3] + x * y,
-            rows[4] + x * z,
-            rows[5] + y * z,
-        )
-    a = rows[0]
-    b = rows[1]
-    c = rows[2]
-    d = abs(rows[3])
-    e = abs(rows[4])
-    f = abs(rows[5])
-    return math.sqrt(max(a + d + e, b + d + f, c + e + f))
+        x = rotation[n, p, 0, j]
+        y = rotation[n, p, 1, j]
+        z = rotation[n, p, 2, j]
+        xx += x * x
+        yy += y * y
+        zz += z * z
+        xy += x * y
+        xz += x * z
+        yz += y * z
+    xy = abs(xy)
+    xz = abs(xz)
+    yz = abs(yz)
+    return math.sqrt(max(xx + xy + xz, yy + xy + yz, zz + xz + yz))
 
 
 @LEAN
 def cut_segments(extents, rate_h, rate_v, longest, out):
-    """Split the symbols into segments over which polynomials of low degree represent the array
-    gains.
+    """Split the symbols into segments over which the array gains are polynomials of low degree.
 
     Fills the table of segments out (N, 6) and returns how many segments there are. rate_h, rate_v:
     largest rate of the gains (rad per unit of direction cosine); longest: most symbols of a
@@ -120,26 +131,32 @@ def cut_segments(extents, rate_h, rate_v, longest, out):
         room_h = 0.0
         room_v = 0.0
         while end < len(extents) and end - n < longest:
-            d = extents[end, SPREAD]
-            turn = 2.0 * d / (2.0 - d) if d < 1.0 else 2.0
-            a = extents[end, PSI]
-            b = extents[end, OMEGA]
-            l0 = min(low_h, a - turn)
-            l1 = min(low_v, b - turn)
-            h0 = max(high_h, a + turn)
-            h1 = max(high_v, b + turn)
+            # How far a point's direction cosine may be from that of the reference.
+            spread = extents[end, SPREAD]
+            away = 2.0
+            if spread < 1.0:
+                away = 2.0 * spread / (2.0 - spread)
+            psi = extents[end, PSI]
+            omega = extents[end, OMEGA]
+            next_low_h = min(low_h, psi - away)
+            next_low_v = min(low_v, omega - away)
+            next_high_h = max(high_h, psi + away)
+            next_high_v = max(high_v, omega + away)
+            phase_h = (next_high_h - next_low_h) * rate_h
+            phase_v = (next_high_v - next_low_v) * rate_v
             if end == n:
                 # Trade-off: a wider segment needs fewer polynomials, but of a higher degree.
-                room_h = 1.2 * (h0 - l0) * rate_h + DRIFT
-                room_v = 1.2 * (h1 - l1) * rate_v + DRIFT
-            elif (h0 - l0) * rate_h > room_h or (h1 - l1) * rate_v > room_v:
+                room_h = WIDER * (next_high_h - next_low_h) * rate_h + DRIFT
+                room_v = WIDER * (next_high_v - next_low_v) * rate_v + DRIFT
+            elif phase_h > room_h or phase_v > room_v:
                 break
-            low_h = l0
-            low_v = l1
-            high_h = h0
-            high_v = h1
+            low_h = next_low_h
+            low_v = next_low_v
+            high_h = next_high_h
+            high_v = next_high_v
             end += 1
-        out[count, START], out[count, END] = n, end
+        out[count, START] = n
+        out[count, END] = end
         out[count, PSI_CENTRE] = 0.5 * (low_h + high_h)
         out[count, PSI_HALF] = 0.5 * (high_h - low_h) * (1.0 + 1e-9) + 1e-9
         out[count, OMEGA_CENTRE] = 0.5 * (low_v + high_v)

@@ -1,5 +1,4 @@
-"""The inputs of one symbol: the gain polynomials of its segment, its constants, and its points, one
-strip at a time.
+"""The inputs of one symbol: its segment's gain polynomials, its constants and its points.
 
 A segment is a run of successive symbols that share polynomials for the array gains
 (`range_bounds`).
@@ -17,8 +16,9 @@ from lowalt.machine.jit import INLINED
 
 @INLINED
 def fit_gain(gain, centre, half, error, unit, fold, work, row):
-    """Fit a gain on centre +- half to `error` into a row of `work`; returns (degree, error bound
-    with roundings).
+    """Fit a gain on centre +- half to `error` into a row of `work`.
+
+    Returns (degree, error bound with roundings).
 
     The degree is -1 where the polynomial would be too long. unit: the rounding of the type it is
     evaluated in. Order k rounds its argument, its coefficient, its products and sums: at most 3 k +
@@ -38,8 +38,9 @@ def fit_gain(gain, centre, half, error, unit, fold, work, row):
 
 @INLINED
 def fit_gains(segment, aims, gains, error, unit, fold, work):
-    """Fit a segment's horizontal and vertical gain; returns (their degrees, bound of the error of
-    their product).
+    """Fit a segment's horizontal and vertical gain.
+
+    Returns their degrees, and a bound of the error of their product.
 
     segment: row of the table of segments; aims: the beams' direction cosines; gains: `ArrayGains`;
     else as `fit_gain`.
@@ -99,8 +100,9 @@ def constants(sample, ref, segment, centre, half):
 
 @INLINED
 def fill_offsets(sample, n, r, first, size, placing, offsets):
-    """Fill the offsets with points first..first + size of symbol n, relative to the reference and
-    over r_ref = r.
+    """Fill the offsets with points first..first + size of symbol n.
+
+    Offsets are relative to the reference and over r_ref = r.
     """
     rotation = sample.scene.rotation
     translation = sample.scene.translation
@@ -109,7 +111,9 @@ def fill_offsets(sample, n, r, first, size, placing, offsets):
     cosine = sample.radar.cosine
     sine = sample.radar.sine
     scale = 1.0 / r
-    x0, y0, z0 = translation[n, q, 0], translation[n, q, 1], translation[n, q, 2]
+    x0 = translation[n, q, 0]
+    y0 = translation[n, q, 1]
+    z0 = translation[n, q, 2]
     if rotation.shape[0] == 0:
         end = min(first + size, translation.shape[1])
         vector_loops.place_nodes(
@@ -138,7 +142,9 @@ def fill_offsets(sample, n, r, first, size, placing, offsets):
             g = rotation[at, p, none, two]
             h = rotation[at, p, one, two]
             k = rotation[at, p, two, two]
-            x, y = translation[at, p, none] - x0, translation[at, p, one] - y0
+            x = translation[at, p, none] - x0
+            y = translation[at, p, one] - y0
+            z = translation[at, p, two] - z0
             pose = (
                 (
                     (cosine * a + sine * b) * scale,
@@ -154,11 +160,13 @@ def fill_offsets(sample, n, r, first, size, placing, offsets):
                 (
                     (cosine * x + sine * y) * scale,
                     (cosine * y - sine * x) * scale,
-                    (translation[at, p, two] - z0) * scale,
+                    z * scale,
                 ),
             )
             vector_loops.place_part(
                 sample.lay.coordinates, low, high - low, pose, placing, offsets, low - first
             )
     for i in range(end - first, size):
-        offsets.eps[i], offsets.y[i], offsets.z[i] = 0.0, 0.0, 0.0
+        offsets.eps[i] = 0.0
+        offsets.y[i] = 0.0
+        offsets.z[i] = 0.0

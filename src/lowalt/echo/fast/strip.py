@@ -1,5 +1,6 @@
-"""A strip: the points of one symbol that the fast kernel processes together. Its arrays, constants
-and length.
+"""A strip: the points of one symbol that the fast kernel processes together.
+
+Here are its arrays, constants and length.
 
 The arrays of a strip fit into the first-level cache.
 """
@@ -15,15 +16,20 @@ STRIP = 256
 MULTIPLE = 16
 """Strips hold whole multiples of this many points; the padding has no amplitude."""
 STRIP_ROOM = STRIP + MULTIPLE + 8
-"""Length of a work array: a strip plus room for a part's last group, which may write beyond it. It
-is not a power of two, because with arrays a multiple of 4096 bytes apart loads wait for unrelated
-stores (4K aliasing)."""
+"""Length of a work array.
+
+It is a strip plus room for a part's last group, which may write beyond it. It is not a power of
+two, because with arrays a multiple of 4096 bytes apart loads wait for unrelated stores (4K
+aliasing).
+"""
 
 
 class Placing(NamedTuple):
-    """Constants that place the points: twice the unit vector to the reference (array's axes), and
-    how horizontal and vertical coordinates become direction cosines on [-1, 1] before the division
-    by r."""
+    """Constants that give a point's offset from the reference in the array's axes.
+
+    twice_x, twice_y, twice_z: twice the unit vector to the reference; the others: how horizontal
+    and vertical coordinates become direction cosines on [-1, 1] before the division by r.
+    """
 
     twice_x: float
     twice_y: float
@@ -35,9 +41,12 @@ class Placing(NamedTuple):
 
 
 class Geometry(NamedTuple):
-    """One symbol's constants: shifts of the scaled direction cosines psi and omega; scale and shift
-    that take the relative range difference to [-1, 1]; turns of phase per relative range
-    difference, per psi and per omega; the reference's turn."""
+    """One symbol's constants.
+
+    psi_shift, omega_shift: of the scaled direction cosines; cell_scale, cell_shift: take the
+    relative range difference to [-1, 1]; turn_range, turn_psi, turn_omega: turns of phase per
+    relative range difference, per psi and per omega; turn_start: the reference's turn.
+    """
 
     psi_shift: float
     omega_shift: float
@@ -50,8 +59,9 @@ class Geometry(NamedTuple):
 
 
 class Offsets(NamedTuple):
-    """A strip's points in float64 (STRIP_ROOM,): eps = r^2 / r_ref^2 - 1, scaled horizontal and
-    vertical coordinate.
+    """A strip's points in float64, (STRIP_ROOM,) each.
+
+    eps: r^2 / r_ref^2 - 1; y, z: scaled horizontal and vertical coordinate.
     """
 
     eps: np.ndarray
@@ -60,9 +70,11 @@ class Offsets(NamedTuple):
 
 
 class Strip(NamedTuple):
-    """A strip's points in the type of the sums (STRIP_ROOM,): direction cosines and ranges on [-1,
-    1], turns on [-1/2, 1/2], (r_ref / r)^2, array gains, and real and imaginary part of the
-    amplitudes."""
+    """A strip's points in the type of the sums, (STRIP_ROOM,) each.
+
+    psi, omega, cells: direction cosines and ranges on [-1, 1]; turn: on [-1/2, 1/2]; square: (r_ref
+    / r)^2; gain_h, gain_v: array gains; real, imag: of the amplitudes.
+    """
 
     psi: np.ndarray
     omega: np.ndarray
@@ -77,7 +89,9 @@ class Strip(NamedTuple):
 
 @LEAN
 def strip_size(points: int) -> int:
-    """Return the points of a strip when a target has `points` (padded): equal shares of at most
-    STRIP, whole multiples of MULTIPLE."""
+    """Return the number of points of a strip when a target has `points` (padded).
+
+    Strips are equal shares of at most STRIP points and whole multiples of MULTIPLE.
+    """
     shares = -(-points // STRIP)
     return -(-points // (shares * MULTIPLE)) * MULTIPLE

@@ -1,5 +1,4 @@
-"""The fast kernel's loops over a strip of one symbol's points, which the compiler turns into vector
-instructions.
+"""The fast kernel's loops over a strip of points, which the compiler turns into vector code.
 
 Every smooth factor is a polynomial whose degree the plan chose by its error bound, so the same
 loops serve exact mode and every tolerance, in float64 or float32. The compiler may reorder sums and
@@ -17,8 +16,9 @@ from lowalt.machine.jit import INNER_VECTOR
 
 @INNER_VECTOR
 def horner(x, c, row, degree, out, size):
-    """Fill out[:size] with the sum of c[row, k] x^k for k up to `degree`, four orders a pass over
-    the strip.
+    """Fill out[:size] with the polynomial sum of c[row, k] x^k, k up to `degree`.
+
+    Each pass over the strip takes four orders.
     """
     top = c[row, degree]
     first = degree & 3
@@ -56,8 +56,9 @@ def horner(x, c, row, degree, out, size):
 
 @INNER_VECTOR
 def place_part(coordinates, low, size, pose, placing, offsets, at):
-    """Fill the offsets from `at` with `size` points of a part from `low`, and with up to MULTIPLE -
-    1 beyond.
+    """Fill the offsets from `at` with `size` points of a part from `low`.
+
+    Up to MULTIPLE - 1 offsets beyond are filled, too.
 
     coordinates: those of all points in their parts' frames (m); pose: rows of the part's matrix and
     its offset from the reference, in the array's axes (normal, horizontal, up), over r_ref. The
@@ -70,7 +71,9 @@ def place_part(coordinates, low, size, pose, placing, offsets, at):
     at = np.uint64(at)
     low = np.uint64(low)
     for i in range(np.uint64(-(-size // MULTIPLE) * MULTIPLE)):
-        x, y, z = px[low + i], py[low + i], pz[low + i]
+        x = px[low + i]
+        y = py[low + i]
+        z = pz[low + i]
         a = xx * x + xy * y + xz * z + x0
         b = yx * x + yy * y + yz * z + y0
         c = zx * x + zy * y + zz * z + z0
@@ -81,8 +84,9 @@ def place_part(coordinates, low, size, pose, placing, offsets, at):
 
 @INNER_VECTOR
 def place_nodes(translation, n, q, low, size, axes, placing, offsets):
-    """Do as `place_part` for `size` points from `low` that are parts of their own, relative to the
-    point q.
+    """Fill the offsets with `size` points from `low` that are parts of their own.
+
+    They are relative to the point q; everything else is as in `place_part`.
 
     axes: cosine and sine of the array's normal, and 1 / r_ref.
     """
@@ -96,10 +100,12 @@ def place_nodes(translation, n, q, low, size, axes, placing, offsets):
     py = translation[n, q, 1]
     pz = translation[n, q, 2]
     for i in range(np.uint64(size)):
-        x, y = translation[n, low + i, 0] - px, translation[n, low + i, 1] - py
+        x = translation[n, low + i, 0] - px
+        y = translation[n, low + i, 1] - py
+        z = translation[n, low + i, 2] - pz
         a = (cosine * x + sine * y) * scale
         b = (cosine * y - sine * x) * scale
-        c = (translation[n, low + i, 2] - pz) * scale
+        c = z * scale
         eps[i] = a * (hx + a) + b * (hy + b) + c * (hz + c)
         ey[i] = b * y_scale + y_shift
         ez[i] = c * z_scale + z_shift
@@ -137,8 +143,7 @@ def geometry(offsets, constants, size, strip):
 
 @INNER_VECTOR
 def amplitudes(strip, share, first, cosine, sine, size):
-    """Fill real and imag of the strip: share of amplitude times gains times (cosine, sine) of the
-    turn.
+    """Fill real and imag of the strip: share times gains times (cosine, sine) of the turn.
 
     share: all points' amplitudes over their sum; cosine, sine: tuples of the coefficients of cos(2
     pi t) and sin(2 pi t) / t in t^2. Returns the sums of |amplitude| and of |amplitude| times
@@ -176,8 +181,9 @@ def amplitudes(strip, share, first, cosine, sine, size):
 
 @INNER_VECTOR
 def moments(strip, at, size):
-    """Return the sums of real and of imag times 1, v, v^2, v^3, v = cells, over `size` points from
-    `at`.
+    """Return the sums of real and of imag times 1, v, v^2, v^3 over `size` points from `at`.
+
+    v: the strip's cells.
 
     real and imag are then multiplied by v^4, for the next four orders.
     """

@@ -15,8 +15,11 @@ from lowalt.echo.fast.strip import STRIP_ROOM, Offsets, Strip
 
 
 class Approximation(NamedTuple):
-    """All approximations: the plan's polynomials, the array gains as sums of cosines, the cell
-    kernels, and the weights of `polynomials.folding`."""
+    """All approximations of a sample.
+
+    plan: its polynomials; gains: array gains as sums of cosines; cells: the cell kernels; fold: the
+    weights of `polynomials.folding`.
+    """
 
     plan: EchoPlan
     gains: ArrayGains
@@ -25,8 +28,11 @@ class Approximation(NamedTuple):
 
 
 class Symbols(NamedTuple):
-    """The symbols to compute: index (B,) of each in the sample, and the rows of its tables:
-    reference ranges (B, 7), extents (B, 5), and the segments (S, 6) that B symbols fall into."""
+    """The symbols to compute.
+
+    index: (B,) of each in the sample; refs, extents: the rows (B, 7) and (B, 5) of its tables of
+    reference ranges and of extents; segments: (S, 6), those that B symbols fall into.
+    """
 
     index: np.ndarray  # type: ignore[assignment]  # a tuple's own method of this name is not used
     refs: np.ndarray
@@ -35,9 +41,12 @@ class Symbols(NamedTuple):
 
 
 class Found(NamedTuple):
-    """The results of every symbol, each (N,): the strongest cell's value and index;
-    `strongest_cell`'s state; sum of |amplitudes|; bound of the value's error; whether there is a
-    near-tie; certified lead over every other cell."""
+    """The results of every symbol, each (N,).
+
+    values, cells: the strongest cell's value and index; state: of `strongest_cell`; totals: sum of
+    |amplitudes|; bounds: of the value's error; ties: whether there is a near-tie; gaps: certified
+    lead over every other cell.
+    """
 
     values: np.ndarray
     cells: np.ndarray
@@ -51,21 +60,24 @@ class Found(NamedTuple):
     def empty(cls, count: int) -> "Found":
         """Return room for `count` symbols, none of them computed."""
         return cls(
-            np.zeros(count, np.complex128),
-            np.zeros(count, np.int64),
-            np.ones(count, np.int64),
-            np.zeros(count),
-            np.zeros(count),
-            np.zeros(count, np.bool_),
-            np.zeros(count),
+            values=np.zeros(count, np.complex128),
+            cells=np.zeros(count, np.int64),
+            state=np.ones(count, np.int64),
+            totals=np.zeros(count),
+            bounds=np.zeros(count),
+            ties=np.zeros(count, np.bool_),
+            gaps=np.zeros(count),
         )
 
 
 class Workspace(NamedTuple):
-    """Work arrays: Taylor terms of a gain (3, rates); moments (2, orders); gain coefficients (2,
-    TOP + 1), in float64 and in the strip's type; cell sums (2 SIDE + 1, 2); bounds for far cells
-    (4,); a strip's arrays; and every point's share (padded L,) of the sum of amplitudes, in the
-    strip's type."""
+    """Work arrays of the driver.
+
+    taylor: Taylor terms of a gain (3, rates); moments: (2, orders); coefficients, typed: of the
+    gains, (2, TOP + 1), in float64 and in the strip's type; sums: of cells, (2 SIDE + 1, 2); far:
+    bounds for far cells (4,); offsets, strip: a strip's arrays; share: every point's share (padded
+    L,) of the sum of amplitudes, in the strip's type.
+    """
 
     taylor: np.ndarray
     moments: np.ndarray
@@ -84,18 +96,24 @@ def workspace(approximation: Approximation, amplitude: np.ndarray) -> Workspace:
     The strip's arrays are separate allocations of odd length, because rows of one array would be a
     multiple of 4096 bytes apart, and loads would wait for unrelated stores (4K aliasing).
     """
-    kind = np.float32 if approximation.plan.single else np.float64
+    kind: type = np.float64
+    if approximation.plan.single:
+        kind = np.float32
     gains = approximation.gains
     rates = max(len(gains.horizontal.rates), len(gains.vertical.rates))
+    orders = approximation.cells.kernels.shape[2]
+    share = amplitude
     total = amplitude.sum()
+    if total > 0:
+        share = amplitude / total
     return Workspace(
-        np.empty((3, rates)),
-        np.empty((2, approximation.cells.kernels.shape[2])),
-        np.empty((2, TOP + 1)),
-        np.empty((2, TOP + 1), kind),
-        np.empty((2 * SIDE + 1, 2)),
-        np.empty(4),
-        Offsets(*(np.empty(STRIP_ROOM) for _ in Offsets._fields)),
-        Strip(*(np.empty(STRIP_ROOM, kind) for _ in Strip._fields)),
-        (amplitude / total if total > 0 else amplitude).astype(kind),
+        taylor=np.empty((3, rates)),
+        moments=np.empty((2, orders)),
+        coefficients=np.empty((2, TOP + 1)),
+        typed=np.empty((2, TOP + 1), kind),
+        sums=np.empty((2 * SIDE + 1, 2)),
+        far=np.empty(4),
+        offsets=Offsets(*(np.empty(STRIP_ROOM) for _ in Offsets._fields)),
+        strip=Strip(*(np.empty(STRIP_ROOM, kind) for _ in Strip._fields)),
+        share=share.astype(kind),
     )

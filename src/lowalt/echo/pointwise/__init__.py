@@ -1,3 +1,4 @@
-"""The pointwise kernel: reference range, terms of every point, sums over points. It serves any
-geometry and array.
+"""The pointwise kernel: reference range, terms of every point, sums over points.
+
+It serves any geometry and array.
 """

@@ -13,11 +13,10 @@ NEAR_TIE = 1e-12
 
 @INNER
 def strongest_of(sums, first, last):
-    """Return the largest |sum| of the rows first..last of sums (cells, 2), the second largest, and
-    the largest's row.
+    """Return (largest |sum|, second largest, row of the largest) of rows first..last of sums.
 
-    Columns of sums: real and imaginary part. Of equal sums the first row wins. The second largest
-    is -1 where only one row is given.
+    sums: (cells, 2), columns real and imaginary part. Of equal sums the first row wins. The second
+    largest is -1 where only one row is given.
     """
     best = -1.0
     second = -1.0
@@ -25,7 +24,11 @@ def strongest_of(sums, first, last):
     for j in range(first, last + 1):
         strength = sums[j, 0] * sums[j, 0] + sums[j, 1] * sums[j, 1]
         if strength > best:
-            best, second, which = strength, best, j
+            second = best
+            best = strength
+            which = j
         elif strength > second:
             second = strength
-    return math.sqrt(best), math.sqrt(second) if second > 0.0 else second, which
+    if second > 0.0:
+        second = math.sqrt(second)
+    return math.sqrt(best), second, which

@@ -14,8 +14,11 @@ from lowalt.machine.jit import INNER, LEAN
 from lowalt.numerics import double_double
 
 X, Y, Z, RANGE, TURN, CELL, REST = range(7)
-"""Columns of the table of reference ranges: vector from the station (m), range (m), fraction of a
-turn of its phase, nearest whole range cell, and the rest of the range in cells."""
+"""Columns of the table of reference ranges.
+
+They are the vector from the station (m), range (m), fraction of a turn of its phase, nearest whole
+range cell, and the rest of the range in cells.
+"""
 
 two_sum = LEAN(double_double.two_sum)
 two_product = LEAN(double_double.two_product)
@@ -30,15 +33,16 @@ def _fraction(r, r_lo, k, k_lo):
 
 
 @LEAN
-def _fill(place, radar, out):
-    """Fill `out` (N, 7) with the reference ranges of places (N, 3) m; `reference` names the
-    columns.
+def _fill(position, radar, out):
+    """Fill `out` (N, 7) with the reference ranges of positions (N, 3) m.
+
+    The columns are those of `reference`.
     """
-    for n in range(len(place)):
+    for n in range(len(position)):
         h2 = 0.0
         h2_lo = 0.0
         for i in range(3):
-            d, d_lo = two_sum(place[n, i], -radar.station[i])
+            d, d_lo = two_sum(position[n, i], -radar.station[i])
             out[n, i] = d
             p, q = two_product(d, d)
             h2, more = two_sum(h2, p)
@@ -53,11 +57,11 @@ def _fill(place, radar, out):
         out[n, CELL], out[n, REST] = _fraction(r, r_lo, radar.cells, radar.cells_lo)
 
 
-def reference(place: np.ndarray, radar: Radar) -> np.ndarray:
-    """Return the table of reference ranges (N, 7) of points `place` (N, 3) m seen by one station.
+def reference(position: np.ndarray, radar: Radar) -> np.ndarray:
+    """Return the table (N, 7) of reference ranges of positions (N, 3) m seen by one station.
 
     Columns: X, Y, Z, RANGE, TURN, CELL, REST.
     """
-    out = np.empty((len(place), 7))
-    _fill(place, radar, out)
+    out = np.empty((len(position), 7))
+    _fill(position, radar, out)
     return out

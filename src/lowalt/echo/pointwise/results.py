@@ -37,8 +37,10 @@ def far_bound(z, u, low, high, count):
     total = 0.0
     for l in range(len(z)):  # noqa: E741
         y = u[l] - middle
-        c = z[l] * math.sin(math.pi * (u[l] - np.rint(u[l])))
-        c *= -1.0 if int(np.rint(u[l])) & 1 else 1.0
+        whole = np.rint(u[l])
+        c = z[l] * math.sin(math.pi * (u[l] - whole))
+        if int(whole) & 1:
+            c = -c
         c0 += c
         c1 += c * y
         a2 += abs(c) * y * y
@@ -70,20 +72,26 @@ def strongest(z, u, base, count, sums):
             high = -base % count + count - 1
         for j in range(low, high + 1):
             there = cell_sum(z, u, j, count)
-            sums[j - low, 0], sums[j - low, 1] = there.real, there.imag
+            sums[j - low, 0] = there.real
+            sums[j - low, 1] = there.imag
         best, second, which = strongest_of(sums, 0, high - low)
-        far = 0.0 if high - low + 1 >= count else far_bound(z, u, low, high, count)
+        far = 0.0
+        if high - low + 1 < count:
+            far = far_bound(z, u, low, high, count)
         if far < best * (1.0 - NEAR_TIE):
             break
     tie = best - second <= NEAR_TIE * best and count > 1
-    value = complex(sums[which, 0], sums[which, 1]) * cell_phase(base + low + which, count)
-    return value, (base + low + which) % count, tie, best - max(second, far)
+    cell = base + low + which
+    value = complex(sums[which, 0], sums[which, 1]) * cell_phase(cell, count)
+    return value, cell % count, tie, best - max(second, far)
 
 
 @PLAIN
 def room(scene):
     """Return empty `PointTerms` for the points of a scene."""
-    count = scene.translation.shape[1] if scene.rotation.shape[0] == 0 else len(scene.points)
+    count = len(scene.points)
+    if scene.rotation.shape[0] == 0:
+        count = scene.translation.shape[1]
     return PointTerms(
         np.empty((count, 3)), np.empty(count, np.complex128), np.empty(count), np.empty(count)
     )
@@ -91,8 +99,9 @@ def room(scene):
 
 @PLAIN
 def signal(scene, radar, refs, symbols, aims, found, risks):
-    """Fill `found` (`refine.Found`) and risks (N,) at `symbols`, indices of refs; gaps without
-    roundings.
+    """Fill `found` and risks (N,) at `symbols`, indices of refs.
+
+    found: `refine.Found`, whose gaps do not yet allow for roundings.
 
     Returns 0, or n L + l + 1 where point l stands in the station at symbol n.
     """
@@ -121,9 +130,9 @@ def matrix(scene, radar, refs, aims, out):
             return n * len(points.e) + fault
         base = int(refs[n, CELL])
         for j in range(total):
-            out[n, (base + j) % total] = cell_sum(points.z, points.u, j, total) * cell_phase(
-                base + j, total
-            )
+            cell = base + j
+            value = cell_sum(points.z, points.u, j, total)
+            out[n, cell % total] = value * cell_phase(cell, total)
     return 0
 
 
@@ -136,8 +145,9 @@ def bounded(
     pointwise_bound: tuple[float, float],
     found: Found,
 ) -> int:
-    """Fill `found` at `symbols` as `signal`, with error bounds and with gaps that allow for them;
-    returns as `signal`.
+    """Fill `found` at `symbols` as `signal` does, with error bounds and gaps that allow for them.
+
+    Returns as `signal`.
 
     pointwise_bound: `refine.Method.pointwise_bound`.
     """

@@ -1,5 +1,6 @@
-"""The pointwise kernel: every point's complex amplitude and range at one symbol, whatever the
-geometry or arrays.
+"""The pointwise kernel: every point's complex amplitude and range at one symbol.
+
+It serves any geometry and array.
 
 Used for symbols that the fast kernel cannot decide.
 """
@@ -14,9 +15,11 @@ from lowalt.machine.jit import LEAN, PLAIN
 
 
 class PointTerms(NamedTuple):
-    """Values of all points at one symbol: places `e` (L, 3) m from the reference's point; complex
-    amplitudes `z` without the cell's own phase, ranges `u` in cells from the reference's cell, and
-    risks (`terms`), each (L,)."""
+    """Values of all points at one symbol, (L,) each but `e`.
+
+    e: (L, 3) m, position from the reference's point; z: complex amplitude without the cell's own
+    phase; u: range in cells from the reference's cell; risk: of `terms`.
+    """
 
     e: np.ndarray
     z: np.ndarray
@@ -26,12 +29,15 @@ class PointTerms(NamedTuple):
 
 @PLAIN
 def sin_pi(x):
-    """Return sin(pi x), exactly zero for integer x: the argument is reduced before the product with
-    pi.
+    """Return sin(pi x), exactly zero for integer x.
+
+    The argument is reduced before the product with pi.
     """
     k = np.rint(x)
     s = math.sin(math.pi * (x - k))
-    return -s if int(k) & 1 else s
+    if int(k) & 1:
+        return -s
+    return s
 
 
 @PLAIN
@@ -42,7 +48,9 @@ def dirichlet(x, count):
     """
     k = np.rint(x)
     f = x - k
-    sign = -1.0 if (int(k) & 1) and (count - 1) & 1 else 1.0
+    sign = 1.0
+    if (int(k) & 1) and (count - 1) & 1:
+        sign = -1.0
     if f == 0.0:
         return sign * count
     return sign * sin_pi(count * f) / math.sin(math.pi * f)
@@ -50,21 +58,24 @@ def dirichlet(x, count):
 
 @LEAN
 def aim_cosines(aim, station, sine, cosine):
-    """Return the direction cosines (horizontal, vertical) of the beams (Eq. 4 put into Psi and
-    Omega).
+    """Return the direction cosines (horizontal, vertical) of the beams.
+
+    They are Eq. 4 put into Psi and Omega.
     """
-    x, y, z = aim[0] - station[0], aim[1] - station[1], aim[2] - station[2]
+    x = aim[0] - station[0]
+    y = aim[1] - station[1]
+    z = aim[2] - station[2]
     r = math.sqrt(x * x + y * y + z * z)
     return (cosine * y - sine * x) / r, z / r
 
 
 @PLAIN
-def offsets(scene, n, place, e):
-    """Fill e (L, 3) with the points' positions relative to `place` (3,) at symbol n (m)."""
+def offsets(scene, n, origin, e):
+    """Fill e (L, 3) with the points' positions relative to `origin` (3,) at symbol n (m)."""
     if scene.rotation.shape[0] == 0:
         for l in range(len(e)):  # noqa: E741
             for i in range(3):
-                e[l, i] = scene.translation[n, l, i] - place[i]
+                e[l, i] = scene.translation[n, l, i] - origin[i]
         return
     for l in range(len(e)):  # noqa: E741
         p = scene.part[l]
@@ -72,7 +83,7 @@ def offsets(scene, n, place, e):
             turned = 0.0
             for j in range(3):
                 turned += scene.rotation[n, p, i, j] * scene.points[l, j]
-            e[l, i] = turned + (scene.translation[n, p, i] - place[i])
+            e[l, i] = turned + (scene.translation[n, p, i] - origin[i])
 
 
 @PLAIN
@@ -84,9 +95,11 @@ def terms(scene, radar, ref, n, aims, out):
     direction. Returns 0, or 1 + l where point l stands in the station. Source: paper Eqs. 7 and 24,
     steering sums as Chebyshev polynomials.
     """
-    place = scene.translation[n, 0 if scene.rotation.shape[0] == 0 else scene.part[0]]
+    first = 0
+    if scene.rotation.shape[0] > 0:
+        first = scene.part[0]
     e, z, u, risk = out
-    offsets(scene, n, place, e)
+    offsets(scene, n, scene.translation[n, first], e)
     phase_h = radar.kappa / 4.0 * (radar.transmit_h + radar.receive_h - 2)
     phase_v = radar.kappa / 4.0 * (radar.transmit_v + radar.receive_v - 2)
     cells = radar.cells
@@ -123,8 +136,9 @@ def terms(scene, radar, ref, n, aims, out):
 
 @PLAIN
 def cell_phase(m, count):
-    """Return the phase factor exp(j pi (M-1) m / M) of range cell m; its argument is reduced in
-    whole numbers.
+    """Return the phase factor exp(j pi (M-1) m / M) of range cell m.
+
+    Its argument is reduced in whole numbers.
     """
     turn = ((count - 1) * (m % (2 * count)) % (2 * count)) / (2.0 * count)
     return complex(math.cos(2.0 * math.pi * turn), math.sin(2.0 * math.pi * turn))
@@ -138,8 +152,9 @@ def cell_weight(x, count):
 
 @PLAIN
 def cell_sum(z, u, j, count):
-    """Return the sum of the points in the cell j cells after the reference's, without the cell's
-    phase.
+    """Return the sum of the points in the cell j cells after the reference's.
+
+    The cell's own phase is left out.
     """
     total = 0.0j
     for l in range(len(z)):  # noqa: E741

@@ -1,3 +1,1 @@
-"""Correctly rounded values: sums in double-double arithmetic where a bound cannot tell the nearest
-complex64.
-"""
+"""Correctly rounded values: double-double sums where a bound cannot tell the nearest complex64."""

@@ -30,8 +30,7 @@ def same_single(x, error):
 
 @LEAN
 def doubtful(values, bounds, totals, gaps, out):
-    """Fill `out` with the symbols whose nearest complex64 or strongest cell the bounds do not
-    decide.
+    """Fill `out` with the symbols whose nearest complex64 or strongest cell is not decided.
 
     Returns their number, and how many of them lack a proved strongest cell. A symbol whose
     amplitudes are all zero is exactly zero.
@@ -59,7 +58,10 @@ def to_odd(high, low, bits):
         return high
     bits.view(np.float64)[0] = high
     if bits[0] & 1 == 0:
-        bits[0] += 1 if (low > 0.0) == (high > 0.0) else -1
+        if (low > 0.0) == (high > 0.0):
+            bits[0] += 1
+        else:
+            bits[0] -= 1
     return bits.view(np.float64)[0]
 
 
@@ -81,7 +83,8 @@ def compute_again(sample, symbols, found, work, bits):
 
 @INLINED
 def same_double(x, error, bits):
-    """Return whether all numbers within `error` of a double-double have the same nearest float32;
+    """Return whether all numbers within `error` of a double-double have the same nearest float32.
+
     bits: work array.
     """
     # Rounding to double first could move both ends onto the tie between them.
@@ -99,13 +102,13 @@ def correct(
     strengths differ by less than the error count as equal, and the lowest index wins.
     """
     open_ones = np.empty(len(refs), np.int64)
-    count, unproved = doubtful(found.values, found.bounds, found.totals, found.gaps, open_ones)
+    count, _ = doubtful(found.values, found.bounds, found.totals, found.gaps, open_ones)
     if not count:
         return 0, 0
     open_ones = open_ones[:count]
     work = np.empty((ROWS, len(sample.lay.root) + 4))
     bits = np.empty(1, np.int64)
-    unproved_ones = open_ones[found.gaps[open_ones] <= 0.0] if unproved else ()
+    unproved_ones = open_ones[found.gaps[open_ones] <= 0.0]
     for n in unproved_ones:
         cells = _contenders(sample, refs, int(n), pointwise_bound)
         if len(cells) > 1:

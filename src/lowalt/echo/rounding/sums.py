@@ -1,5 +1,6 @@
-"""One range cell of one symbol in double-double: the paper's sum over all points, with an error of
-2^-64 of its terms.
+"""One range cell of one symbol in double-double: the paper's sum over all points.
+
+The error is 2^-64 of the terms.
 
 The loops are compiled without fast-math flags. Vector instructions of any width give equal results,
 because only the last loop sums over points, in a fixed order.
@@ -15,24 +16,28 @@ from lowalt.numerics.exact.sines import dirichlet, sine_cosine
 constants_of = INLINED(constants)
 
 X, Y, Z, SIDE, UP, TURN, CELL, AMPLITUDE = range(0, 16, 2)
-"""Rows of the work array (16, points), the low half in the row that follows: vector from the
-station (m), half turns of array phase per element, horizontally and vertically, turns of phase,
-distance from the cell over M, and amplitude."""
+"""Rows of the work array (16, points), the low half in the row that follows.
+
+They are the vector from the station (m), half turns of array phase per element, horizontally and
+vertically, turns of phase, distance from the cell over M, and amplitude.
+"""
 ROWS = 16
 
 
 @INNER
-def place(sample, n, work):
-    """Fill rows X, Y, Z with the vectors from the station to all points at symbol n; padding stands
-    at one metre.
+def vectors(sample, n, work):
+    """Fill rows X, Y, Z with the vectors from the station to all points at symbol n.
+
+    The padding stands at one metre.
     """
     scene = sample.scene
     station = sample.radar.station
     groups = sample.lay.groups
     x, y, z = sample.lay.coordinates
     for i in range(work.shape[1]):
-        for row in range(6):
-            work[row, i] = 0.0 if row else 1.0
+        for row in range(SIDE):
+            work[row, i] = 0.0
+        work[X, i] = 1.0
     if scene.rotation.shape[0] == 0:
         for i in range(scene.translation.shape[1]):
             for axis in range(3):
@@ -59,8 +64,9 @@ def place(sample, n, work):
 
 @INLINED
 def cosines(x, y, z, constants):
-    """Return (range, its inverse, horizontal and vertical direction cosine) of a vector from the
-    station (m).
+    """Return (range, its inverse, horizontal and vertical direction cosine).
+
+    They are those of a vector from the station (m).
     """
     r = root(add(add(multiply(x, x), multiply(y, y)), multiply(z, z)))
     inverse = divide((1.0, 0.0), r)
@@ -74,11 +80,9 @@ def geometry(work, root_rcs, rcs_m2, constants, aims, cell, count):
     whole doubles.
     """
     for i in range(np.uint64(len(root_rcs))):
-        x, y, z = (
-            (work[X, i], work[X + 1, i]),
-            (work[Y, i], work[Y + 1, i]),
-            (work[Z, i], work[Z + 1, i]),
-        )
+        x = (work[X, i], work[X + 1, i])
+        y = (work[Y, i], work[Y + 1, i])
+        z = (work[Z, i], work[Z + 1, i])
         r, inverse, psi, omega = cosines(x, y, z, constants)
         psi = subtract(psi, aims[0])
         omega = subtract(omega, aims[1])
@@ -90,16 +94,19 @@ def geometry(work, root_rcs, rcs_m2, constants, aims, cell, count):
         work[CELL, i], work[CELL + 1, i] = divide(away, (count, 0.0))
         high = root_rcs[i]
         p, e = product(high, high)
-        low = ((rcs_m2[i] - p) - e) / (2.0 * high if high > 0.0 else 1.0)
-        work[AMPLITUDE, i], work[AMPLITUDE + 1, i] = multiply(
-            (high, low), multiply(inverse, inverse)
-        )
+        divisor = 1.0
+        if high > 0.0:
+            divisor = 2.0 * high
+        low = ((rcs_m2[i] - p) - e) / divisor
+        amplitude = multiply((high, low), multiply(inverse, inverse))
+        work[AMPLITUDE, i], work[AMPLITUDE + 1, i] = amplitude
 
 
 @INLINED
 def patterns(radar):
-    """Return the five Dirichlet kernels that a point's amplitude is multiplied by: (row, elements,
-    squared) of each.
+    """Return the five Dirichlet kernels that a point's amplitude is multiplied by.
+
+    Each is (row, elements, squared).
 
     They are the patterns of both arrays, horizontal and vertical, and of the subcarriers; row: that
     of the half turns in the work array; squared: where both arrays are alike, one kernel is squared
@@ -107,11 +114,17 @@ def patterns(radar):
     """
     like_h = radar.transmit_h == radar.receive_h
     like_v = radar.transmit_v == radar.receive_v
+    other_h = float(radar.receive_h)
+    other_v = float(radar.receive_v)
+    if like_h:
+        other_h = 1.0
+    if like_v:
+        other_v = 1.0
     return (
         (SIDE, float(radar.transmit_h), like_h),
-        (SIDE, 1.0 if like_h else float(radar.receive_h), False),
+        (SIDE, other_h, False),
         (UP, float(radar.transmit_v), like_v),
-        (UP, 1.0 if like_v else float(radar.receive_v), False),
+        (UP, other_v, False),
         (CELL, float(radar.subcarriers), False),
     )
 
@@ -119,14 +132,14 @@ def patterns(radar):
 @INNER
 def times_dirichlet(work, row, count, twice, points):
     """Multiply the amplitudes by U_{count-1} of a row's half turns, or by its square."""
-    row, below = np.uint64(row), np.uint64(row + 1)
+    below = np.uint64(row + 1)
+    row = np.uint64(row)
     for i in range(np.uint64(points)):
         u = dirichlet((work[row, i], work[below, i]), count)
         if twice:
             u = multiply(u, u)
-        work[AMPLITUDE, i], work[AMPLITUDE + 1, i] = multiply(
-            (work[AMPLITUDE, i], work[AMPLITUDE + 1, i]), u
-        )
+        amplitude = (work[AMPLITUDE, i], work[AMPLITUDE + 1, i])
+        work[AMPLITUDE, i], work[AMPLITUDE + 1, i] = multiply(amplitude, u)
 
 
 @INNER
@@ -141,10 +154,12 @@ def wave(work, points):
 
 @INLINED
 def phase_of(cell, count):
-    """Return sine and cosine of a cell's own phase, exp(j pi (M - 1) m / M), reduced in whole
-    numbers.
+    """Return sine and cosine of a cell's own phase, exp(j pi (M - 1) m / M).
+
+    The phase is reduced in whole numbers.
     """
-    return sine_cosine(divide((float((count - 1) * cell % (2 * count)), 0.0), (2.0 * count, 0.0)))
+    half_turns = float((count - 1) * cell % (2 * count))
+    return sine_cosine(divide((half_turns, 0.0), (2.0 * count, 0.0)))
 
 
 @LEAN
@@ -158,12 +173,13 @@ def cell_value(sample, n, cell, work):
     scene = sample.scene
     lay = sample.lay
     radar = sample.radar
-    x, y = two_sum(scene.aim[0], -radar.station[0]), two_sum(scene.aim[1], -radar.station[1])
+    x = two_sum(scene.aim[0], -radar.station[0])
+    y = two_sum(scene.aim[1], -radar.station[1])
     z = two_sum(scene.aim[2], -radar.station[2])
     exact = constants_of(radar.exact)
     points = len(lay.root)
     _, _, psi0, omega0 = cosines(x, y, z, exact)
-    place(sample, n, work)
+    vectors(sample, n, work)
     geometry(work, lay.root, lay.rcs, exact, (psi0, omega0), float(cell), float(radar.subcarriers))
     for row, elements, squared in patterns(radar):
         if elements > 1.0:

@@ -1,5 +1,4 @@
-"""The benchmark lowalt-40: its frozen definition, its tracks, scores of submissions, and the table
-of baselines.
+"""The benchmark lowalt-40: its definition, tracks, scores of submissions, and table of baselines.
 
 `load(track, part)` gives the samples of a track's part, `write(path, samples, probabilities)` a
 submission.

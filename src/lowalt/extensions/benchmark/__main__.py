@@ -1,5 +1,6 @@
-"""`python -m lowalt.extensions.benchmark RESULTS` writes the checksums of finished runs, for a new
-version.
+"""Write the checksums of finished runs, for a new version of the benchmark.
+
+`python -m lowalt.extensions.benchmark RESULTS` does it.
 """
 
 import argparse

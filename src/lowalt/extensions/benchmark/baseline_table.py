@@ -1,7 +1,6 @@
-"""The table of the benchmark: a row for each track and method, kept as CSV, and its form in
-documents and reports.
-"""
+"""The table of the benchmark, a row per track and method, as CSV and as documents show it."""
 
+import string
 from pathlib import Path
 
 import numpy as np
@@ -50,15 +49,17 @@ COLUMNS = (
 
 
 def read(folder: str | Path = REFERENCE) -> list[dict]:
-    """Return the kept table's rows; numbers as text. Raises: InputError where it is missing or
-    lacks a column.
+    """Return the kept table's rows; numbers as text.
+
+    Raises: InputError where it is missing or lacks a column.
     """
     return read_csv(shipped(Path(folder) / TABLE), *COLUMNS, what="table of the benchmark")
 
 
 def interval(row: dict) -> Interval:
-    """Return a row's headline number with its interval. Raises: InputError where a cell is no
-    number.
+    """Return a row's headline number with its interval.
+
+    Raises: InputError where a cell is no number.
     """
     return Interval(*(number(row, name, TABLE) for name in ("percent", "low", "high")))
 
@@ -69,10 +70,13 @@ def words(found: Interval) -> str:
 
 
 def result(row: dict) -> str:
-    """Return a row's result as text: percent with its interval, the group as a letter, a tick where
-    it is confirmed.
+    """Return a row's result as text: percent with its interval, the group as a letter.
+
+    A tick follows where the result is confirmed.
     """
-    return f"{words(interval(row))} {chr(ord('a') + int(row['group']) - 1)}{' ✓' if row['confirmed_percent'] else ''}"
+    group = string.ascii_lowercase[int(row["group"]) - 1]
+    tick = " ✓" if row["confirmed_percent"] else ""
+    return f"{words(interval(row))} {group}{tick}"
 
 
 def by_subtype(values: np.ndarray, weight: np.ndarray, subtypes: np.ndarray) -> dict[str, float]:
@@ -93,63 +97,70 @@ def by_subtype(values: np.ndarray, weight: np.ndarray, subtypes: np.ndarray) -> 
 
 
 def _mean(rows: list[dict], column: str) -> str:
-    """The mean of a column of core-seconds with two digits, over the rows that have it; a dash
-    where none has.
+    """The mean of a column of core-seconds with two digits, over the rows that have it.
+
+    It is a dash where none has.
     """
     found = [number(row, column, TABLE) for row in rows if row[column]]
-    return (
-        "-"
-        if not found
-        else f"{np.mean(found):.2g}"
-        if np.mean(found) < 10
-        else f"{np.mean(found):.0f}"
-    )
+    if not found:
+        return "-"
+    mean = np.mean(found)
+    return f"{mean:.2g}" if mean < 10 else f"{mean:.0f}"
 
 
 def _digit(cell: str | None) -> str:
     """A number of the table with one digit; a dash where there is none."""
-    return f"{float(cell):.1f}" if cell else "-"
+    if not cell:
+        return "-"
+    return f"{float(cell):.1f}"
 
 
 def tables(rows: list[dict]) -> list[list[tuple[str, ...]]]:
-    """Return the rows as tables of texts, one for each of SHOWN: names of columns, then a line for
-    each method.
+    """Return the rows as tables of texts, one for each of SHOWN.
 
+    A table has the names of its columns, then a line for each method.
     Methods are sorted by the mean over a table's tracks, best first; costs are means over all
     tracks. After `unseen` stand its columns BY_SUBTYPE.
     """
     by_method: dict[str, dict[str, dict]] = {}
     for row in rows:
         by_method.setdefault(row["method"], {})[row["track"]] = row
+    with_rows = {row["track"] for row in rows}
     found = []
-    for tracks in (
-        [track for track in shown if any(track in one for one in by_method.values())]
-        for shown in SHOWN
-    ):
-        percents = {
-            name: [number(one[track], "percent", TABLE) for track in tracks if track in one]
-            for name, one in by_method.items()
-        }
-        heads = []
-        for track in tracks:
-            heads += [track, *DECIDES] if track == "unseen" else [track]
-        lines = [
-            ("method", *heads, "chosen on", "seeds", "training, core-s", "1000 samples, core-s")
-        ]
-        for name in sorted(by_method, key=lambda name: -np.mean(percents[name] or [0])):
-            own = by_method[name]
-            results = []
-            for track in tracks:
-                results.append(result(own[track]) if track in own else "-")
-                if track == "unseen":
-                    results += [_digit(own.get(track, {}).get(column)) for column in BY_SUBTYPE]
-            chosen = next(iter(own.values()))["chosen_on"]
-            seeds = sorted({row["seeds"] for row in own.values()})
-            counts = " to ".join(dict.fromkeys((seeds[0], seeds[-1])))
-            costs = (
-                _mean(list(own.values()), column)
-                for column in ("train_core_s", "test_core_s_per_1000")
-            )
-            lines.append((name, *results, chosen, counts, *costs))
-        found += [lines] if tracks else []
+    for shown in SHOWN:
+        tracks = [track for track in shown if track in with_rows]
+        if tracks:
+            found.append(_table(tracks, by_method))
     return found
+
+
+def _table(tracks: list[str], by_method: dict[str, dict[str, dict]]) -> list[tuple[str, ...]]:
+    """One table of texts; by_method: the rows of each method by track."""
+    heads = ["method"]
+    for track in tracks:
+        heads.append(track)
+        if track == "unseen":
+            heads += DECIDES
+    heads += ["chosen on", "seeds", "training, core-s", "1000 samples, core-s"]
+
+    def worse(name: str) -> float:
+        """Minus the mean percent of a method over the tracks that it has."""
+        own = by_method[name]
+        percents = [number(own[track], "percent", TABLE) for track in tracks if track in own]
+        return -float(np.mean(percents or [0]))
+
+    lines: list[tuple[str, ...]] = [tuple(heads)]
+    for name in sorted(by_method, key=worse):
+        own = by_method[name]
+        cells = [name]
+        for track in tracks:
+            cells.append(result(own[track]) if track in own else "-")
+            if track == "unseen":
+                cells += [_digit(own.get(track, {}).get(column)) for column in BY_SUBTYPE]
+        cells.append(next(iter(own.values()))["chosen_on"])
+        seeds = sorted({row["seeds"] for row in own.values()})
+        cells.append(" to ".join(dict.fromkeys((seeds[0], seeds[-1]))))
+        cells.append(_mean(list(own.values()), "train_core_s"))
+        cells.append(_mean(list(own.values()), "test_core_s_per_1000"))
+        lines.append(tuple(cells))
+    return lines

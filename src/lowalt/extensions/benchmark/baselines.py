@@ -1,5 +1,4 @@
-"""What is kept of the baselines: one value per motion model and training seed of each, for paired
-differences.
+"""What is kept of each baseline for paired differences: a value per motion model and seed.
 
 `TRACK.npz` holds an array (seeds, models) per baseline, in the order of the motion models' names:
 the numbers of correct samples (uint8), or in the track open-set the values of `scoring.values_of`
@@ -26,8 +25,7 @@ def path_of(track: Track) -> Path:
 
 
 def kept(track: Track) -> dict[str, np.ndarray]:
-    """Return the values (seeds, models) of a track's kept baselines by name; none where the track
-    has none.
+    """Return the values (seeds, models) of a track's kept baselines by name, if it has any.
 
     Raises: InputError for a file that is damaged.
     """
@@ -41,36 +39,37 @@ def kept(track: Track) -> dict[str, np.ndarray]:
             found = {name: data[name] for name in data.files}
     except UNREADABLE as error:
         raise InputError(f"{path}: not a file of baselines ({error})") from error
-    return {
-        name: array / count if array.dtype == np.uint8 else array.astype(float)
-        for name, array in found.items()
-    }
+    values = {}
+    for name, array in found.items():
+        is_count = array.dtype == np.uint8
+        values[name] = array / count if is_count else array.astype(float)
+    return values
 
 
 def compared(first: str, second: str) -> dict[str, dict[str, Interval]]:
-    """Return {track: {first, second, difference}} of two methods of the table, in percent with 95 %
-    intervals.
+    """Return {track: {first, second, difference}} of two methods of the table.
 
+    They are in percent with 95 % intervals.
     The difference is paired: both methods answered the same samples. Raises: InputError for an
     unknown method.
     """
     rows = {(row["track"], row["method"]): row for row in baseline_table.read()}
     known = list(dict.fromkeys(method for _, method in rows))
-    if unknown := [name for name in (first, second) if name not in known]:
+    unknown = [name for name in (first, second) if name not in known]
+    if unknown:
         wanted = instead(unknown, known, "one that `lowalt benchmark table` lists")
         raise InputError(
             f"{unknown[0]!r}: neither a folder nor a method of {VERSION}'s table, expected {wanted}"
         )
     found = {}
-    for track in (
-        track
-        for track in TRACKS.values()
-        if {(track.name, first), (track.name, second)} <= set(rows)
-    ):
-        one, other = (baseline_table.interval(rows[track.name, name]) for name in (first, second))
+    for track in TRACKS.values():
+        if (track.name, first) not in rows or (track.name, second) not in rows:
+            continue
         arrays = kept(track)
-        lead = difference(
-            track, Values(arrays[first], *models_of(track, *track.samples())), arrays[second]
-        )
-        found[track.name] = {"first": one, "second": other, "difference": lead}
+        of_first = Values(arrays[first], *models_of(track, *track.samples()))
+        found[track.name] = {
+            "first": baseline_table.interval(rows[track.name, first]),
+            "second": baseline_table.interval(rows[track.name, second]),
+            "difference": difference(track, of_first, arrays[second]),
+        }
     return found

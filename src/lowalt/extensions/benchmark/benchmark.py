@@ -1,6 +1,4 @@
-"""The command `lowalt benchmark`: data, tracks, scores of submissions, confirmed results, the table
-of baselines.
-"""
+"""The command `lowalt benchmark`: data, tracks, scores, confirmed results, table of baselines."""
 
 import argparse
 import sys
@@ -98,39 +96,39 @@ def add_to(commands: argparse._SubParsersAction, name: str) -> None:
 
 def tracks(options: argparse.Namespace) -> Answer:
     """List the tracks."""
-    facts = [
-        {
+    facts = []
+    lines = []
+    for track in TRACKS.values():
+        counts = {use: len(track.numbers(use)) for use in ("train", "validation", "test")}
+        about = {
             "track": track.name,
             "serves": track.serves,
             "limit": track.limit,
             "headline": track.headline,
             "part": track.part,
-            **{use: len(track.numbers(use)) for use in ("train", "validation", "test")},
-            **_cost(track),
+            **counts,
         }
-        for track in TRACKS.values()
-    ]
-    line = "{track:12} {train:6} train {validation:6} validate {test:6} test {cost:42} {serves} {limit}"
-    lines = [line.format(**one, cost=_words(TRACKS[one["track"]])).rstrip() for one in facts]
+        cost = cost_of([track])
+        if cost is not None:
+            about |= cost._asdict()
+        facts.append(about)
+        lines.append(
+            f"{track.name:12} {counts['train']:6} train {counts['validation']:6} validate "
+            f"{counts['test']:6} test {_words(track):42} {track.serves} {track.limit}".rstrip()
+        )
     return Answer(facts, "\n".join(lines))
-
-
-def _cost(track: Track) -> dict:
-    """The cost of a track's data as facts; none where it has not been measured."""
-    cost = cost_of([track])
-    return cost._asdict() if cost else {}
 
 
 def _words(*tracks: Track) -> str:
     """The cost of the data of tracks as text."""
     cost = cost_of(list(tracks))
-    return cost.words if cost else "cost not measured"
+    if cost is None:
+        return "cost not measured"
+    return cost.words
 
 
 def _targets(part: str, pairs: set[tuple[str, str]]) -> list[str]:
-    """What the workflow makes of a part: signals, and the images of the (group, fold) pairs that
-    tracks need.
-    """
+    """What the workflow makes of a part: signals, and images of some (group, fold) pairs."""
     run = run_name(part)
     views = f"results/{run}/views/{config_of(part)['recognition']['size']}"
     shards = [shard for shard in listed(part).plan.shards if tuple(shard.split("-")[:2]) in pairs]
@@ -139,9 +137,9 @@ def _targets(part: str, pairs: set[tuple[str, str]]) -> list[str]:
 
 
 def make(options: argparse.Namespace) -> Answer:
-    """Make the data of tracks with the workflow, and compare them with the kept checksums; status 1
-    where they differ.
+    """Make the data of tracks with the workflow, and compare them with the kept checksums.
 
+    The status is 1 where they differ.
     Images are made of those groups and folds only that the tracks train, validate or test on.
 
     Raises: InputError for an unknown track.
@@ -151,11 +149,11 @@ def make(options: argparse.Namespace) -> Answer:
         f"{' '.join(options.track)}: from empty {_words(*asked)}; what is there is kept",
         file=sys.stderr,
     )
-    facts = {}
+    facts: dict[str, list[str]] = {}
     lines = []
     for part, pairs in parts_of(asked).items():
-        words = argparse.Namespace(
-            overlay=[Path(one) for one in map(str, map(workflow.shipped, overlays(part)))],
+        run_options = argparse.Namespace(
+            overlay=[workflow.shipped(overlay) for overlay in overlays(part)],
             configfile=[],
             target=_targets(part, pairs),
             cores=options.cores,
@@ -164,24 +162,28 @@ def make(options: argparse.Namespace) -> Answer:
             profile=None,
             json=options.json,
         )
-        ended = workflow.ended(words)
-        if ended["status"]:
-            return Answer(
-                {"parts": facts}, f"{run_name(part)}: the workflow failed", ended["status"]
-            )
+        status = workflow.ended(run_options)["status"]
+        if status:
+            return Answer({"parts": facts}, f"{run_name(part)}: the workflow failed", status)
         facts[part] = frozen_bytes.compared(part, "results")
-        count = sum(name.startswith(f"{part}/") for name in frozen_bytes.kept())
-        lines += facts[part][:5] or [
-            f"{run_name(part)}: {count} files are equal to the kept checksums"
-        ]
+        if facts[part]:
+            lines += facts[part][:5]
+        else:
+            count = sum(name.startswith(f"{part}/") for name in frozen_bytes.kept())
+            lines.append(f"{run_name(part)}: {count} files are equal to the kept checksums")
     return Answer({"parts": facts}, "\n".join(lines), int(any(facts.values())))
 
 
 def against(name: str, lead: Interval, width: int) -> str:
-    """Return a line on the difference to a method, or on a track; name: of either, padded to a
-    width.
+    """Return a line on the difference to a method, or on a track.
+
+    name: of either, padded to a width.
     """
-    verdict = "better" if lead.low > 0 else "worse" if lead.high < 0 else "not distinguishable"
+    verdict = "not distinguishable"
+    if lead.low > 0:
+        verdict = "better"
+    elif lead.high < 0:
+        verdict = "worse"
     return f"  {name:{width}}  {lead.value:+6.1f} ({lead.low:+.1f} to {lead.high:+.1f})  {verdict}"
 
 
@@ -199,40 +201,40 @@ def score(options: argparse.Namespace) -> Answer:
 def _report(track: Track, facts: dict) -> str:
     """The scores as text."""
     counts = f"{facts['samples']} samples, training seeds: {facts['seeds']}"
+    percent = baseline_table.words(facts["percent"])
+    f1 = baseline_table.words(facts["macro_f1_percent"])
     lines = [
         f"{VERSION}, track {track.name}, {counts}; percent, with 95 % intervals",
-        "{} {}, macro F1 {}".format(
-            facts["headline"],
-            *map(baseline_table.words, (facts["percent"], facts["macro_f1_percent"])),
-        ),
+        f"{facts['headline']} {percent}, macro F1 {f1}",
     ]
     if "others_percent" in facts:
+        hardest = " and ".join(baseline_table.HARDEST)
         lines.append(
-            f"median over subtypes {facts['median_percent']:.1f}, without {' and '.join(baseline_table.HARDEST)} "
+            f"median over subtypes {facts['median_percent']:.1f}, without {hardest} "
             f"{facts['others_percent']:.1f}"
         )
     if "rejected_percent" in facts:
         lines.append(
             f"rejected of the held-out class at 95 % acceptance: {facts['rejected_percent']:.1f}"
         )
-    lines.append(
-        "by SNR: "
-        + ", ".join(f"{snr} dB {share:.1f}" for snr, share in facts["by_snr_percent"].items())
-    )
-    lines += [track.limit] if track.limit else []
+    by_snr = [f"{snr} dB {share:.1f}" for snr, share in facts["by_snr_percent"].items()]
+    lines.append("by SNR: " + ", ".join(by_snr))
+    if track.limit:
+        lines.append(track.limit)
     worst = sorted(facts["by_subtype_percent"].items(), key=lambda pair: pair[1])
-    lines.append(
-        "lowest subtypes: " + ", ".join(f"{name} {share:.1f}" for name, share in worst[:5])
-    )
+    lowest = [f"{name} {share:.1f}" for name, share in worst[:5]]
+    lines.append("lowest subtypes: " + ", ".join(lowest))
     leads = sorted(facts["differences"].items(), key=lambda pair: -pair[1].value)
-    lines += ["against the baselines, paired difference:"] if leads else []
+    if leads:
+        lines.append("against the baselines, paired difference:")
     lines += [against(name, lead, 31) for name, lead in leads]
     return "\n".join(lines)
 
 
 def confirmed(options: argparse.Namespace) -> Answer:
-    """Confirm a model, or a file that answers. Raises: as the functions of
-    `lowalt.extensions.benchmark.confirm`.
+    """Confirm a model, or a file that answers.
+
+    Raises: as the functions of `lowalt.extensions.benchmark.confirm`.
     """
     from lowalt.extensions.benchmark.confirm import confirm, confirm_predictions
 
@@ -248,15 +250,16 @@ def confirmed(options: argparse.Namespace) -> Answer:
     else:
         found = confirm(options.model, track, options.backbone)
     text = (
-        f"{VERSION} {found.track}, confirmed: {baseline_table.words(found.percent)} % of {found.samples} samples, "
-        f"root seed {found.seed}, SHA-256 {found.sha256}"
+        f"{VERSION} {found.track}, confirmed: {baseline_table.words(found.percent)} % of "
+        f"{found.samples} samples, root seed {found.seed}, SHA-256 {found.sha256}"
     )
     return Answer(found._asdict(), text)
 
 
 def rescored(options: argparse.Namespace) -> Answer:
-    """Score all submissions of a folder and write its table. Raises: InputError naming what is
-    wrong with one.
+    """Score all submissions of a folder and write its table.
+
+    Raises: InputError naming what is wrong with one.
     """
     if not options.folder.is_dir():
         raise InputError(f"{options.folder}: no such folder of submissions")
@@ -264,9 +267,8 @@ def rescored(options: argparse.Namespace) -> Answer:
         rows = list(submitted_rows.rows(options.folder))
     path = submitted_rows.write(options.folder, rows)
     line = "{submission:24} {track:12} {percent} ({low} to {high})"
-    return Answer(
-        rows, "\n".join([*(line.format(**row) for row in rows), f"{path}: {len(rows)} rows"])
-    )
+    lines = [line.format(**row) for row in rows]
+    return Answer(rows, "\n".join([*lines, f"{path}: {len(rows)} rows"]))
 
 
 def shown(options: argparse.Namespace) -> Answer:
@@ -277,9 +279,7 @@ def shown(options: argparse.Namespace) -> Answer:
         raise InputError(
             f"{baseline_table.TABLE}: no row of {names}, expected a track with baselines"
         )
-    return Answer(
-        rows,
-        "\n".join(
-            f"{row['track']:12} {row['method']:31} {baseline_table.result(row)}" for row in rows
-        ),
-    )
+    lines = []
+    for row in rows:
+        lines.append(f"{row['track']:12} {row['method']:31} {baseline_table.result(row)}")
+    return Answer(rows, "\n".join(lines))

@@ -1,5 +1,4 @@
-"""The tracks of the benchmark: which samples train, validate and test, what is predicted, and which
-number counts.
+"""The tracks of the benchmark: their samples, what is predicted, and which number counts.
 
 The samples that train and validate are always those of the main part. Validation uses fold val of
 the subtypes that train. Samples that validate or test come in the order of a digest of their keys,
@@ -46,17 +45,15 @@ class Track:
 
     @property
     def whole(self) -> bool:
-        """Whether intervals draw whole subtypes, because results should hold for other subtypes
-        too.
-        """
+        """Whether intervals draw whole subtypes, because results should hold for other subtypes."""
         return self.protocol == "unseen"
 
     @property
     def trains_as(self) -> str:
-        """Name of the track whose training serves this one: `seen` for a track that only tests
-        elsewhere.
-        """
-        return self.name if self.part == MAIN else self.protocol
+        """Name of the track whose training serves this one, such as `seen` for `low-snr`."""
+        if self.part == MAIN:
+            return self.name
+        return self.protocol
 
     def truth(self, part: str = "") -> Truth:
         """Return the samples of the track's part (or another), labelled as this track asks."""
@@ -69,15 +66,16 @@ class Track:
         return Truth(replace(facts, label=np.argsort(order)[labels]), tuple(names[order].tolist()))
 
     def samples(self, use: str = "test", split: str = "") -> Truth:
-        """Return the samples of a use, and their classes; split: as in `numbers`. Raises: as
-        `numbers`.
+        """Return the samples of a use, and their classes.
+
+        split: as in `numbers`. Raises: as `numbers`.
         """
-        every, classes = self.truth(self.part if use == "test" else MAIN)
-        return Truth(every.take(self.numbers(use, split)), classes)
+        part = self.part if use == "test" else MAIN
+        facts, classes = self.truth(part)
+        return Truth(facts.take(self.numbers(use, split)), classes)
 
     def numbers(self, use: str, split: str = "") -> np.ndarray:
-        """Return which samples of `truth(MAIN)` train or validate, or which of `truth()` test, as
-        numbers.
+        """Return which samples of `truth(MAIN)` train or validate, or which of `truth()` test.
 
         Those that train come in the order of `truth`, the others in that of `shuffled`. split: a
         name of INNER, of which one subtype of each class does not train, and only these validate.
@@ -94,34 +92,37 @@ class Track:
         pairs = FOLDS[self.protocol][use]
         if use == "test" and self.whole:
             pairs = _TESTED
-        chosen = np.array(
-            [pair in pairs for pair in zip(facts.group.tolist(), facts.fold.tolist(), strict=True)]
-        )
+        own_pairs = zip(facts.group.tolist(), facts.fold.tolist(), strict=True)
+        chosen = np.array([pair in pairs for pair in own_pairs])
         if use == "train" and self.shots:
             chosen |= _first(facts, self.shots)
         if use != "test" and self.headline == "AUROC":
             chosen &= facts.label != self.truth(MAIN).classes.index(UNKNOWN)
         numbers = np.flatnonzero(chosen)
-        return numbers if use == "train" else shuffled(facts, numbers)
+        if use == "train":
+            return numbers
+        return shuffled(facts, numbers)
 
     def _inner(self, use: str, split: str) -> np.ndarray:
-        """Which samples of `truth(MAIN)` train or validate in an inner split. Raises: InputError;
-        see `numbers`.
+        """Which samples of `truth(MAIN)` train or validate in an inner split.
+
+        Raises: InputError; see `numbers`.
         """
         if not self.whole or split not in INNER or use == "test":
             whole = [track.name for track in TRACKS.values() if track.whole]
             raise InputError(
-                f"split {split!r} of track {self.name}, part {use!r}: expected one of {list(INNER)}, a track of "
-                f"{whole}, and the part train or validation"
+                f"split {split!r} of track {self.name}, part {use!r}: expected one of "
+                f"{list(INNER)}, a track of {whole}, and the part train or validation"
             )
         numbers = self.numbers(use)
         held = np.isin(self.truth(MAIN).facts.subtype[numbers], held_out(split))
-        return numbers[held if use == "validation" else ~held]
+        if use == "validation":
+            return numbers[held]
+        return numbers[~held]
 
 
 def held_out(split: str) -> tuple[str, ...]:
-    """Return the subtypes that an inner split holds out: one of each class of the subtypes that
-    train.
+    """Return the subtypes that an inner split holds out: one of each class among those that train.
 
     The subtypes of each class are ordered by the SHA-256 of their names; split k holds out the k-th
     of each class.
@@ -146,8 +147,9 @@ def shuffled(facts: Facts, numbers: np.ndarray) -> np.ndarray:
 
 
 def _first(facts: Facts, count: int) -> np.ndarray:
-    """Whether each sample is of the first `count` motion models in fold train of its unseen
-    subtype, (samples,).
+    """Whether each sample, (samples,), is of the first models that train of its unseen subtype.
+
+    count: the number of motion models in fold train that count as first.
     """
     chosen = np.zeros(len(facts), bool)
     for name in np.unique(facts.subtype[facts.group == "unseen"]):

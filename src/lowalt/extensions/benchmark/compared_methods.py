@@ -13,7 +13,6 @@ def compared_named(first: str, second: str) -> tuple[dict, str]:
     facts = compared(first, second)
     lines = [f"paired difference in percent: {first} | {second}"]
     for track, one in facts.items():
-        lines.append(
-            f"{against(track, one['difference'], 12)}; {words(one['first'])} | {words(one['second'])}"
-        )
+        difference = against(track, one["difference"], 12)
+        lines.append(f"{difference}; {words(one['first'])} | {words(one['second'])}")
     return {"tracks": facts}, "\n".join(lines)

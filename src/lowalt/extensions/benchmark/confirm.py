@@ -38,9 +38,7 @@ CONFIRMED = tuple(
 
 
 class Confirmed(NamedTuple):
-    """A confirmed result: accuracy in percent, samples and root seed of the test set, SHA-256 of
-    the model.
-    """
+    """A confirmed result: accuracy in percent, samples, root seed, SHA-256 of the model."""
 
     track: str
     percent: Interval
@@ -50,22 +48,29 @@ class Confirmed(NamedTuple):
 
 
 def dataset(track: Track, seed: int) -> Dataset:
-    """Return the test set of a track with this root seed, made when it is read: all motion models
-    test.
+    """Return the test set of a track with this root seed, made when it is read.
 
+    All its motion models test.
     Subtypes are those that the track tests on; they and the scene are the benchmark's, clouds and
     motion are new.
     """
-    count = MODELS.get(track.part, USUAL) * (2 if track.whole else 1)
-    every = {"train": 1, "val": 0, "test": 0}
-    more = {"seed": seed, "motion": {"models": count, "models_per_chunk": count}, "split": every}
-    with catch_warnings(
-        action="ignore", category=InputWarning
-    ):  # nobody can change the benchmark's settings
-        return Dataset(
-            merge(config_of(track.part), more),
-            groups=("unseen",) if track.whole else ("seen", "unseen"),
-        )
+    count = MODELS.get(track.part, USUAL)
+    groups: tuple[str, ...] = ("seen", "unseen")
+    if track.whole:
+        # Half of the subtypes test, so each has twice as many motion models.
+        count *= 2
+        groups = ("unseen",)
+    config = merge(
+        config_of(track.part),
+        {
+            "seed": seed,
+            "motion": {"models": count, "models_per_chunk": count},
+            "split": {"train": 1, "val": 0, "test": 0},
+        },
+    )
+    # Nobody can change the benchmark's settings, so warnings about them help nobody.
+    with catch_warnings(action="ignore", category=InputWarning):
+        return Dataset(config, groups=groups)
 
 
 def refuse_other_training(stated: dict, track: Track, path: Path) -> None:
@@ -78,35 +83,39 @@ def refuse_other_training(stated: dict, track: Track, path: Path) -> None:
     missing = [name for name in ("protocol", "trained_on") if not stated.get(name)]
     if missing:
         raise InputError(
-            f"{path}: its file does not state {' and '.join(missing)}, so nobody can tell whether it trained on what "
-            f"the track {track.name} holds out; expected a model that this version of lowalt trained"
+            f"{path}: its file does not state {' and '.join(missing)}, so nobody can tell whether "
+            f"it trained on what the track {track.name} holds out; expected a model that this "
+            "version of lowalt trained"
         )
     if stated["protocol"] != track.protocol:
         raise InputError(
-            f"{path}: its file states the protocol {stated['protocol']!r}, and the track {track.name} trains in the "
-            f"protocol {track.protocol!r}"
+            f"{path}: its file states the protocol {stated['protocol']!r}, and the track "
+            f"{track.name} trains in the protocol {track.protocol!r}"
         )
     check_brought("trained_on", stated["trained_on"], path)
-    allowed = {
-        (subtype, fold): models for subtype, fold, models in statement(track.samples("train").facts)
-    }
-    held_out = set(track.samples("test").facts.subtype.tolist()) if track.whole else set()
+    allowed = {}
+    for subtype, fold, models in statement(track.samples("train").facts):
+        allowed[subtype, fold] = models
+    held_out = set()
+    if track.whole:
+        held_out = set(track.samples("test").facts.subtype.tolist())
     for subtype, fold, models in stated["trained_on"]:
         if (subtype, fold) not in allowed:
             raise InputError(
-                f"{path}: its file states that it trained on {subtype}, fold {fold}, which the track {track.name} "
-                "does not train on"
+                f"{path}: its file states that it trained on {subtype}, fold {fold}, which the "
+                f"track {track.name} does not train on"
             )
         if subtype in held_out and models > allowed[subtype, fold]:
             raise InputError(
-                f"{path}: its file states {models} motion models of {subtype}, of which the track {track.name} "
-                f"trains on {allowed[subtype, fold]}"
+                f"{path}: its file states {models} motion models of {subtype}, of which the track "
+                f"{track.name} trains on {allowed[subtype, fold]}"
             )
 
 
 def stated_by(path: Path) -> dict:
-    """Return the identity in a model's file: what determined its weights. Raises: InputError for no
-    such file.
+    """Return the identity in a model's file: what determined its weights.
+
+    Raises: InputError for no such file.
     """
     from lowalt.recognition import model_file
 
@@ -114,17 +123,14 @@ def stated_by(path: Path) -> dict:
 
 
 class FreshSamples(DatasetSamples):
-    """The test set of a track with one root seed, made here; the log says how many samples have
-    been made.
-    """
+    """The test set of a track with one root seed, made here; the log counts its samples."""
 
     def __init__(self, track: Track, seed: int, columns: list[int], size: int) -> None:
         """columns: the images to make; size: of their pixels."""
         data = dataset(track, seed)
+        folds = {(group, "train") for group in data.groups}
         with announced(f"benchmark confirm: making the targets and motions of root seed {seed}"):
-            super().__init__(
-                data, columns, {(group, "train") for group in data.groups}, size, placed=False
-            )
+            super().__init__(data, columns, folds, size, placed=False)
         self.track = track
         self._made = 0
         self._report = Reporter(len(self.facts), "samples")
@@ -140,13 +146,16 @@ class FreshSamples(DatasetSamples):
         return super().views(numbers)
 
     def signals_and_images(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return signals (n, stations, symbols) complex64 of unit power and images (n, columns,
-        size, size) uint8.
+        """Return the signals and the images of all samples.
+
+        Signals are (n, stations, symbols) complex64 of unit power, images (n, columns, size, size)
+        uint8.
         """
         maker = self.dataset.maker
         signals = []
         images = []
-        for row, snr_db in ((self.rows[number], snr_db) for number, snr_db in self.chosen):
+        for number, snr_db in self.chosen:
+            row = self.rows[number]
             signal = maker.signal(row, snr_db, self.stations)
             signals.append(of_unit_power(signal[list(self.track.stations)]))
             images.append(images_of(maker, row, snr_db, signal, self.columns, self.size))
@@ -165,7 +174,10 @@ def _scored(
 
 
 def refuse_unconfirmable(track: Track) -> None:
-    """Refuse a track whose results cannot be confirmed. Raises: InputError naming those that can."""
+    """Refuse a track whose results cannot be confirmed.
+
+    Raises: InputError naming those that can.
+    """
     if track.name not in CONFIRMED:
         raise InputError(
             f"track {track.name}: cannot be confirmed, expected one of {list(CONFIRMED)}"
@@ -173,8 +185,7 @@ def refuse_unconfirmable(track: Track) -> None:
 
 
 def confirm_predictions(path: str | Path, track: Track) -> Confirmed:
-    """Freeze a user's file of predictions, make the test set that follows from it, run it, and
-    return the result.
+    """Freeze a user's file of predictions, run it on the test set that follows, return the result.
 
     path: a Python file as `predict_file` describes; it runs in this process.
     Raises: InputError as `PredictFile`, for a file that states another training than the track's,
@@ -188,9 +199,8 @@ def confirm_predictions(path: str | Path, track: Track) -> Confirmed:
             f"{(track.name, 'train')}"
         )
     seed = root_seed(file.checksums + VERSION.encode())
-    samples = FreshSamples(
-        track, seed, columns_of(track), config_of(track.part)["recognition"]["size"]
-    )
+    size = config_of(track.part)["recognition"]["size"]
+    samples = FreshSamples(track, seed, columns_of(track), size)
     samples.keep(shuffled(samples.facts, np.arange(len(samples.facts))))
     signals, images = samples.signals_and_images()
     with announced(f"benchmark confirm: {path} answers"):
@@ -200,8 +210,7 @@ def confirm_predictions(path: str | Path, track: Track) -> Confirmed:
 
 
 def confirm(model: str | Path, track: Track, trusted: str = "") -> Confirmed:
-    """Make the test set that follows from a model file, evaluate the model on it, and return the
-    result.
+    """Evaluate a model on the test set that follows from its file, and return the result.
 
     model: a .safetensors file, or the name of one in results/zoo; trusted: FILE.py:FUNCTION of
     a model whose backbone is the user's own code.
@@ -219,8 +228,9 @@ def confirm(model: str | Path, track: Track, trusted: str = "") -> Confirmed:
     classes = track.truth().classes
     if trained.classes != classes or set(trained.scheme.stations) - set(track.stations):
         raise InputError(
-            f"{path}: classes {list(trained.classes)} and stations {list(trained.scheme.stations)}, expected the "
-            f"classes {list(classes)} and some of the stations {list(track.stations)}"
+            f"{path}: classes {list(trained.classes)} and stations "
+            f"{list(trained.scheme.stations)}, expected the classes {list(classes)} and some of "
+            f"the stations {list(track.stations)}"
         )
     refuse_other_training(stated_by(path), track, path)
     content = path.read_bytes()

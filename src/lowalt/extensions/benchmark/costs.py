@@ -1,5 +1,4 @@
-"""What making the data of a track costs: processor time and disk space, measured on runs that made
-them.
+"""What making the data of a track costs: processor time and disk space, as measured on runs.
 
 `costs.csv` has a row for the signals and shards of each part, and one for the images of each group
 and fold.
@@ -32,12 +31,14 @@ class TrackCost(NamedTuple):
     @property
     def words(self) -> str:
         """The cost as text, with the minutes on two cores."""
-        return f"{self.core_s:.0f} core-s, {self.core_s / 120:.1f} min on two cores, {self.megabytes:.0f} MB"
+        minutes = self.core_s / 60 / 2
+        return f"{self.core_s:.0f} core-s, {minutes:.1f} min on two cores, {self.megabytes:.0f} MB"
 
 
 def parts_of(tracks: list[Track]) -> dict[str, set[tuple[str, str]]]:
-    """Return the (group, fold) pairs whose images some tracks need, by part; all tracks train on
-    the main part.
+    """Return the (group, fold) pairs whose images some tracks need, by part.
+
+    All tracks train on the main part.
     """
     found: dict[str, set[tuple[str, str]]] = {MAIN: set()}
     for track in tracks:
@@ -70,8 +71,7 @@ def cost_of(tracks: list[Track]) -> TrackCost | None:
 
 
 def measured(part: str, folder: str | Path) -> list[tuple]:
-    """Return the rows of a part whose run is in a folder, from the times that the workflow kept of
-    its jobs.
+    """Return the rows of a part whose run is in a folder, from the kept times of its jobs.
 
     Raises: InputError where the run's times are missing.
     """
@@ -85,9 +85,11 @@ def measured(part: str, folder: str | Path) -> list[tuple]:
         )
     for path in times:
         last = json.loads(text_of(path, "times of a job").splitlines()[-1])["cpu_time"]
+        if not isinstance(last, (int, float)):
+            # Jobs that end before the workflow's first look have no time.
+            last = 0.0
         files = _files_of(path.relative_to(run / "benchmarks"))
-        # Jobs that end before the workflow's first look have no time.
-        core_s[files] = core_s.get(files, 0.0) + (last if isinstance(last, (int, float)) else 0.0)
+        core_s[files] = core_s.get(files, 0.0) + last
     for path in sorted(run.rglob("*")):
         if path.is_file():
             files = _files_of(path.relative_to(run))
@@ -108,12 +110,15 @@ def _files_of(path: Path) -> str:
 
 
 def write(folder: str | Path, out: str | Path) -> None:
-    """Write the costs of the parts whose runs are in a folder; of other parts the table keeps its
-    rows.
+    """Write the costs of the parts whose runs are in a folder.
+
+    Of other parts the table keeps its rows.
     """
     path = Path(out) / NAME
-    rows = read_csv(path, *COLUMNS, what="table of costs") if path.is_file() else []
-    kept = {(row["part"], row["files"]): tuple(row[name] for name in COLUMNS) for row in rows}
+    kept = {}
+    if path.is_file():
+        for row in read_csv(path, *COLUMNS, what="table of costs"):
+            kept[row["part"], row["files"]] = tuple(row[name] for name in COLUMNS)
     for part in PARTS:
         if (Path(folder) / run_name(part)).is_dir():
             kept |= {(row[0], row[1]): row for row in measured(part, folder)}

@@ -5,6 +5,7 @@ and folds follow from it by rule, so that a submission is scored without any dat
 """
 
 import hashlib
+import itertools
 from functools import cache
 from typing import NamedTuple
 
@@ -28,25 +29,34 @@ SEEDED_AS = {"clutter": "town"}
 
 
 def root_seed(text: str | bytes) -> int:
-    """Return the root seed that a text stands for: the first eight hexadecimal digits of its
-    SHA-256.
+    """Return the root seed that a text stands for: eight hexadecimal digits of its SHA-256.
+
+    They are the first ones.
 
     >>> root_seed("lowalt-40 v1")
     467398228
     """
-    return int(hashlib.sha256(text.encode() if isinstance(text, str) else text).hexdigest()[:8], 16)
+    if isinstance(text, str):
+        text = text.encode()
+    return int(hashlib.sha256(text).hexdigest()[:8], 16)
 
 
 def named_seed(part: str) -> int:
-    """Return the root seed of a part: that of the version's name, followed by a word unless it is
-    the main one.
+    """Return the root seed of a part.
+
+    It is that of the version's name, followed by a word unless the part is the main one.
     """
-    return root_seed(VERSION if part == MAIN else f"{VERSION} {SEEDED_AS.get(part, part)}")
+    if part == MAIN:
+        return root_seed(VERSION)
+    return root_seed(f"{VERSION} {SEEDED_AS.get(part, part)}")
 
 
 def overlays(part: str) -> list[str]:
     """Return the overlays on the default that make up a part's configuration."""
-    return [f"config/{RUN}.yaml", *([] if part == MAIN else [f"config/{RUN}/{part}.yaml"])]
+    main = f"config/{RUN}.yaml"
+    if part == MAIN:
+        return [main]
+    return [main, f"config/{RUN}/{part}.yaml"]
 
 
 def config_of(part: str) -> dict:
@@ -56,11 +66,13 @@ def config_of(part: str) -> dict:
 
 def run_name(part: str) -> str:
     """Return the name of the run that makes a part's data, results/NAME."""
-    return RUN if part == MAIN else f"{RUN}-{part}"
+    if part == MAIN:
+        return RUN
+    return f"{RUN}-{part}"
 
 
 class Truth(NamedTuple):
-    """The samples of a part in a fixed order: facts without places, and the classes by label."""
+    """The samples of a part in a fixed order: facts without positions, and classes by label."""
 
     facts: Facts
     classes: tuple[str, ...]
@@ -70,20 +82,20 @@ class Truth(NamedTuple):
 def listed(part: str) -> SampleList:
     """Return the list of a part's samples, which is read without any data."""
     config = config_of(part)
-    published = {
-        name: record["published"] for name, record in records_of(config["targets"]).items()
-    }
+    records = records_of(config["targets"])
+    published = {name: record["published"] for name, record in records.items()}
     return SampleList(Plan.of(config, published), published)
 
 
 @cache
 def truth(part: str) -> Truth:
-    """Return the samples of a part and its classes, subtype by subtype, model by model, SNR by SNR."""
+    """Return the samples of a part and its classes, by subtype, then model, then SNR."""
     samples = listed(part)
-    nowhere = np.full((len(samples), len(config_of(part)["network"]["stations"])), np.nan)
-    facts = Facts(**samples.columns(), range_m=nowhere, aspect_rad=nowhere)
-    # The list goes model by model, and this part's order subtype by subtype.
-    subtypes = [name for members in samples.plan.groups.values() for name in members]
+    stations = len(config_of(part)["network"]["stations"])
+    unknown = np.full((len(samples), stations), np.nan)
+    facts = Facts(**samples.columns(), range_m=unknown, aspect_rad=unknown)
+    # The list goes model by model, and this order subtype by subtype.
+    subtypes = itertools.chain.from_iterable(samples.plan.groups.values())
     numbers = {name: number for number, name in enumerate(subtypes)}
     order = np.argsort([numbers[name] for name in facts.subtype.tolist()], kind="stable")
     return Truth(facts.take(order), samples.classes)

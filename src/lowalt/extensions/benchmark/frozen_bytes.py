@@ -6,7 +6,9 @@ hashed without the version of the rules, which they name.
 """
 
 import hashlib
+import itertools
 import json
+import math
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -31,16 +33,22 @@ def of_part(part: str, folder: str | Path) -> dict[str, str]:
     Raises: InputError where the part has no data.
     """
     run = Path(folder) / run_name(part)
-    paths = [path for pattern in FILES for path in sorted(run.glob(pattern))]
-    if not paths:
+    sums = {}
+    for pattern in FILES:
+        for path in sorted(run.glob(pattern)):
+            sums[f"{part}/{path.relative_to(run).as_posix()}"] = sha256(path)
+    if not sums:
         raise InputError(f"{run}: no data, expected those of `lowalt benchmark make`")
-    return {f"{part}/{path.relative_to(run).as_posix()}": sha256(path) for path in paths}
+    return sums
 
 
 def kept(name: str = WHOLE) -> dict[str, str]:
     """Return the kept checksums of all parts by PART/FILE, or by PART/KEY for the name SAMPLES."""
-    lines = text_of(shipped(f"{REFERENCE}/{name}"), "checksums").splitlines()
-    return {name: digest for digest, _, name in (line.partition("  ") for line in lines)}
+    sums = {}
+    for line in text_of(shipped(f"{REFERENCE}/{name}"), "checksums").splitlines():
+        digest, _, of_file = line.partition("  ")
+        sums[of_file] = digest
+    return sums
 
 
 def _write(path: Path, sums: dict[str, str]) -> None:
@@ -50,48 +58,57 @@ def _write(path: Path, sums: dict[str, str]) -> None:
 
 
 def compared(part: str, folder: str | Path) -> list[str]:
-    """Return how a part's files compare with the kept checksums: a line for each that is missing,
-    differs or is not kept, those of the earliest stage first. Raises: as `of_part`.
+    """Return how a part's files compare with the kept checksums.
+
+    There is a line for each file that is missing, differs or is not kept, those of the earliest
+    stage first. Raises: as `of_part`.
     """
     found = of_part(part, folder)
     wanted = {name: digest for name, digest in kept().items() if name.startswith(f"{part}/")}
-    words = {name: "is missing" for name in wanted if name not in found}
-    words |= {
-        name: "differs" for name, digest in found.items() if wanted.get(name, digest) != digest
-    }
-    words |= {name: "is not among the kept files" for name in found if name not in wanted}
-    return [f"{name} {words[name]}" for name in {**wanted, **found} if name in words]
+    lines = []
+    for name in wanted | found:
+        if name not in found:
+            lines.append(f"{name} is missing")
+        elif name not in wanted:
+            lines.append(f"{name} is not among the kept files")
+        elif found[name] != wanted[name]:
+            lines.append(f"{name} differs")
+    return lines
 
 
 def write(folder: str | Path, out: str | Path) -> None:
-    """Write the checksums of all parts into the folder `out`; folder: where the runs' folders are."""
-    _write(
-        Path(out) / WHOLE,
-        {name: digest for part in PARTS for name, digest in of_part(part, folder).items()},
-    )
+    """Write the checksums of all parts into the folder `out`.
+
+    folder: where the runs' folders are.
+    """
+    sums: dict[str, str] = {}
+    for part in PARTS:
+        sums |= of_part(part, folder)
+    _write(Path(out) / WHOLE, sums)
 
 
 def write_samples(out: str | Path) -> None:
     """Make the samples of all parts and write their checksums into the folder `out`."""
-    _write(
-        Path(out) / SAMPLES,
-        {f"{part}/{key}": digest for part in PARTS for key, digest in samples(part)},
-    )
+    sums = {}
+    for part in PARTS:
+        for key, digest in samples(part):
+            sums[f"{part}/{key}"] = digest
+    _write(Path(out) / SAMPLES, sums)
 
 
 def samples(part: str) -> Iterator[tuple[str, str]]:
-    """Make one sample of each subtype of a part (or of some, FEW) and yield its key and its
-    SHA-256.
+    """Make one sample of each subtype of a part, or of some (FEW); yield its key and its SHA-256.
 
     The checksum covers the record without the version of its rules, the signals and the tile.
     """
     data = Dataset(config_of(part))
-    names = [name for members in data.plan.groups.values() for name in members]
+    names = list(itertools.chain.from_iterable(data.plan.groups.values()))
     snrs = data.plan.snrs
-    step = -(-len(names) // FEW.get(part, len(names)))
-    for number, name in list(enumerate(names))[::step]:
-        place = data.place_of(name, number % data.plan.models, snrs[number % len(snrs)])
-        image, signal, record = data.made(place)
+    step = math.ceil(len(names) / FEW.get(part, len(names)))
+    for number in range(0, len(names), step):
+        model = number % data.plan.models
+        snr_db = snrs[number % len(snrs)]
+        image, signal, record = data.made(data.place_of(names[number], model, snr_db))
         record.pop("versions")
         text = json.dumps(record, sort_keys=True).encode()
         yield record["key"], hashlib.sha256(text + signal.tobytes() + image.tobytes()).hexdigest()

@@ -1,6 +1,4 @@
-"""The samples of a track's part as arrays: images and complex signals, read from the runs that made
-the data.
-"""
+"""The samples of a track's part as arrays: images and complex signals, read from finished runs."""
 
 from collections.abc import Callable
 from functools import cached_property
@@ -23,15 +21,16 @@ VIEWS = (0, 1, 2)
 
 
 def of_unit_power(signals: np.ndarray) -> np.ndarray:
-    """Return signals (..., symbols) complex64 divided by the root of their mean power; zeros stay
-    zeros.
+    """Return signals (..., symbols) complex64 divided by the root of their mean power.
+
+    Zeros stay zeros.
     """
     power = np.mean(np.abs(signals).astype(float) ** 2, axis=-1, keepdims=True)
     return (signals / np.sqrt(np.where(power > 0, power, 1))).astype(np.complex64)
 
 
 def columns_of(track: Track) -> list[int]:
-    """Return the numbers of the images that a track shows: VRP, TRP and VT of each of its stations."""
+    """Return the numbers of the images that a track shows: VRP, TRP and VT of its stations."""
     return Scheme("all spectra", track.stations, VIEWS).columns
 
 
@@ -50,13 +49,14 @@ class TrackSamples(Samples):
         """
         self.track = track
         source = track.part if part == "test" else MAIN
-        (self.facts, self.classes), self.config = track.samples(part, split), config_of(source)
+        self.facts, self.classes = track.samples(part, split)
+        self.config = config_of(source)
         self.run = Path(folder) / run_name(source)
         self.size = self.config["recognition"]["size"]
         if not self.run.is_dir():
             raise InputError(
-                f"{self.run}: no data, expected those that `lowalt benchmark make --track {track.name}` makes "
-                f"({' and '.join(overlays(source))})"
+                f"{self.run}: no data, expected those that `lowalt benchmark make --track "
+                f"{track.name}` makes ({' and '.join(overlays(source))})"
             )
 
     def __len__(self) -> int:
@@ -74,8 +74,9 @@ class TrackSamples(Samples):
 
     @cached_property
     def images(self) -> np.ndarray:
-        """Index images (n, stations * 3, size, size) uint8. Raises: InputError where a sample has
-        none.
+        """Index images (n, stations * 3, size, size) uint8.
+
+        Raises: InputError where a sample has none.
         """
         pairs = set(zip(self.facts.group.tolist(), self.facts.fold.tolist(), strict=True))
         columns = columns_of(self.track)
@@ -84,22 +85,25 @@ class TrackSamples(Samples):
             for path in (self.run / f"views/{self.size}").glob("*.npz")
             if tuple(path.stem.split("-")[:2]) in pairs
         ]
-        with announced(f"{self.run}: reading images"):
-            found = ViewSamples(stored, columns, pairs) if stored else None
-        places = (
-            {key: number for number, key in enumerate(found.facts.key.tolist())} if found else {}
-        )
-        if missing := [key for key in self.key.tolist() if key not in places]:
-            raise InputError(
-                f"{self.run}/views: no image of {missing[0]}, expected one of every sample; "
-                f"`lowalt benchmark make --track {self.track.name}` makes them"
-            )
-        return found.images[[places[key] for key in self.key.tolist()]]
+        numbers: dict[str, int] = {}
+        if stored:
+            with announced(f"{self.run}: reading images"):
+                found = ViewSamples(stored, columns, pairs)
+            numbers = {key: number for number, key in enumerate(found.facts.key.tolist())}
+        keys = self.key.tolist()
+        for key in keys:
+            if key not in numbers:
+                raise InputError(
+                    f"{self.run}/views: no image of {key}, expected one of every sample; "
+                    f"`lowalt benchmark make --track {self.track.name}` makes them"
+                )
+        return found.images[[numbers[key] for key in keys]]
 
     @cached_property
     def signals(self) -> np.ndarray:
-        """Noisy signals (n, stations, symbols) complex64 of mean power one. Raises: InputError
-        where a sample has none.
+        """Noisy signals (n, stations, symbols) complex64 of mean power one.
+
+        Raises: InputError where a sample has none.
 
         The level is taken out because it counts the points of the target's cloud; see
         docs/benchmark-rules.md.
@@ -108,28 +112,25 @@ class TrackSamples(Samples):
         return self.of_chunks(lambda path: of_unit_power(load_signals(path, network)))
 
     def of_chunks(self, values: Callable[[Path], np.ndarray]) -> np.ndarray:
-        """Return what `values` computes, for the samples and the track's stations alone, (n,
-        stations, ...).
+        """Return what `values` computes for samples and the track's stations, (n, stations, ...).
 
         values: a function from a chunk's noisy signals (.npy) to an array (models, SNRs, stations,
         ...).
         Raises: InputError where a sample has no signal.
         """
         wanted: dict[tuple, list[int]] = {}
-        for number, pair in enumerate(
-            zip(self.facts.subtype.tolist(), self.facts.model.tolist(), strict=True)
-        ):
-            wanted.setdefault(pair, []).append(number)
-        levels = {float(snr): place for place, snr in enumerate(self.config["noise"]["snr_db"])}
+        models = zip(self.facts.subtype.tolist(), self.facts.model.tolist(), strict=True)
+        for number, model in enumerate(models):
+            wanted.setdefault(model, []).append(number)
+        levels = {float(snr): index for index, snr in enumerate(self.config["noise"]["snr_db"])}
         level = [levels[snr] for snr in self.facts.snr_db.tolist()]
         result: np.ndarray | None = None
         paths = sorted((self.run / "noisy").glob("*.npy"))
         for path in reported(paths, len(paths), "files"):
             chunk = values(path)
             if result is None:
-                result = np.empty(
-                    (len(self), len(self.track.stations), *chunk.shape[3:]), chunk.dtype
-                )
+                shape = (len(self), len(self.track.stations), *chunk.shape[3:])
+                result = np.empty(shape, chunk.dtype)
             for row, entry in enumerate(read_table(self.run / f"motion/{path.stem}.csv")):
                 for number in wanted.pop((entry["subtype"], entry["model"]), []):
                     result[number] = chunk[row, level[number]][list(self.track.stations)]
@@ -151,9 +152,9 @@ class TrackSamples(Samples):
 def load(
     track: str, part: str = "train", folder: str | Path = "results", split: str = ""
 ) -> TrackSamples:
-    """Return the samples of a track's part, "train", "validation" or "test"; folder: where the
-    runs' folders are.
+    """Return the samples of a track's part, "train", "validation" or "test".
 
+    folder: where the runs' folders are.
     split: in tracks of unseen subtypes the name of an inner split, "inner-1" to "inner-5". One
     subtype of each class is then absent from "train", and "validation" has these subtypes only.
     Raises: InputError for an unknown track, part or split, or where the data have not been made.

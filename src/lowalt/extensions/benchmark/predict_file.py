@@ -1,6 +1,6 @@
-"""A user's own method as a Python file that answers, for a confirmed result: the file and what it
-reads are frozen.
+"""A user's own method as a Python file that answers, for a confirmed result.
 
+The file and what it reads are frozen.
 The file names the track and part that it trained on, and every file that it reads:
 
     TRAINED_ON = "unseen", "train"
@@ -33,8 +33,9 @@ SYSTEM = ("/usr", "/lib", "/lib64", "/etc", "/proc", "/sys", "/dev")
 
 
 class PredictFile:
-    """A frozen file: `trained_on`, the (track, part) that it states, and `checksums` of it and of
-    all that it reads.
+    """A frozen file: `trained_on`, the (track, part) that it states, and `checksums`.
+
+    The checksums are those of the file and of all that it reads.
     """
 
     def __init__(self, path: str | Path) -> None:
@@ -75,16 +76,14 @@ class PredictFile:
                 alone = _array(predict(signals[one], images[one]), self.path)
                 if alone.shape != every[one].shape or not np.allclose(alone, every[one], atol=1e-3):
                     raise InputError(
-                        f"{self.path}: predict answers sample {number} differently when it is alone, expected "
-                        "answers that depend on their own sample only"
+                        f"{self.path}: predict answers sample {number} differently when it is "
+                        "alone, expected answers that depend on their own sample only"
                     )
         return every
 
     @contextmanager
     def _watched(self) -> Iterator[None]:
-        """Refuse every file that is opened for reading, unless it is frozen or belongs to Python or
-        a library.
-        """
+        """Refuse every file opened for reading that is not frozen, of Python or of a library."""
         libraries = {sys.prefix, sys.base_prefix, *filter(None, sys.path), *SYSTEM}
         roots = tuple(Path(folder).resolve() for folder in libraries)
         watching = [True]
@@ -127,7 +126,8 @@ class PredictFile:
             _forget_modules_of(folder)
         if unnamed:
             raise InputError(
-                f"{self.path}: reads {unnamed[0]}, which its FILES does not name, so it is not frozen"
+                f"{self.path}: reads {unnamed[0]}, which its FILES does not name, so it is not "
+                "frozen"
             )
 
 
@@ -141,11 +141,16 @@ def _forget_modules_of(folder: str) -> None:
 
 def _text(path: str | bytes | Path) -> str:
     """A path as text."""
-    return path.decode(errors="replace") if isinstance(path, bytes) else str(path)
+    if isinstance(path, bytes):
+        return path.decode(errors="replace")
+    return str(path)
 
 
 def _stated(path: Path) -> dict:
-    """The statements TRAINED_ON and FILES of a file, read without running it. Raises: InputError."""
+    """The statements TRAINED_ON and FILES of a file, read without running it.
+
+    Raises: InputError where one is missing or wrong.
+    """
     try:
         tree = ast.parse(text_of(path, "file of predictions"))
     except SyntaxError as error:
@@ -169,7 +174,8 @@ def _stated(path: Path) -> dict:
         or not all(isinstance(one, str) for one in trained_on)
     ):
         raise InputError(
-            f'{path}: does not state what it trained on, expected a line TRAINED_ON = "TRACK", "train"'
+            f"{path}: does not state what it trained on, expected a line "
+            'TRAINED_ON = "TRACK", "train"'
         )
     if not isinstance(found["FILES"], list) or not all(
         isinstance(one, str) for one in found["FILES"]

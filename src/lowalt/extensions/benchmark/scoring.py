@@ -1,5 +1,4 @@
-"""Scores of a submission: the track's headline number, macro F1, paired differences to the kept
-baselines.
+"""Scores of a submission: headline number, macro F1, paired differences to the kept baselines.
 
 Every headline number is a weighted mean of one value per motion model. For accuracy the value is
 the model's share of correct samples. AUROC is the mean, over both strata (trained classes, held-out
@@ -26,8 +25,10 @@ from lowalt.recognition.statistics import accuracy_by, f1_by_snr
 
 
 class Values(NamedTuple):
-    """One value per motion model and training seed, (seeds, models); the weight (models,) and
-    subtype (models,) of each motion model, in the order of their names."""
+    """One value per motion model and training seed, (seeds, models), with weights and subtypes.
+
+    weight, subtypes: (models,), of each motion model in the order of their names.
+    """
 
     values: np.ndarray
     weight: np.ndarray
@@ -43,9 +44,9 @@ def _above(scores: np.ndarray, others: np.ndarray) -> np.ndarray:
 
 
 def ranked(scores: np.ndarray, held_out: np.ndarray) -> tuple[float, np.ndarray]:
-    """Return AUROC and each sample's share of the other stratum against which it is ranked
-    correctly, (n,).
+    """Return AUROC, and how much of the other stratum each sample is ranked correctly against.
 
+    The latter are shares (n,).
     scores (n,): how strongly a sample is held to be of no trained class; held_out (n,) bool:
     whether it is.
     """
@@ -63,8 +64,7 @@ def tested(track: Track, facts: Facts, probabilities: np.ndarray) -> Predictions
 def models_of(
     track: Track, samples: Facts | Predictions, classes: tuple[str, ...]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return weight and subtype (models,) of the motion models of test samples, in the order of
-    their names.
+    """Return weight and subtype (models,) of the motion models of test samples, by their names.
 
     The weight is the model's number of samples. For AUROC it is scaled so that the held-out class
     and the trained ones weigh the same.
@@ -78,8 +78,9 @@ def models_of(
 
 
 def values_of(track: Track, parts: list[Predictions], classes: tuple[str, ...]) -> Values:
-    """Return the values of which the headline number is the weighted mean; parts: of each training
-    seed.
+    """Return the values of which the headline number is the weighted mean.
+
+    parts: the predictions of each training seed.
     """
     if track.headline == "accuracy":
         shares = [part.correct for part in parts]
@@ -91,8 +92,9 @@ def values_of(track: Track, parts: list[Predictions], classes: tuple[str, ...]) 
 
 
 def difference(track: Track, first: Values, second: np.ndarray) -> Interval:
-    """Return the mean of first - second in percent with its 95 % interval; second: values (seeds,
-    models).
+    """Return the mean of first - second in percent with its 95 % interval.
+
+    second: values (seeds, models).
     """
     generator = stream(named_seed(MAIN), "benchmark", track.name)
     found = strict_difference(
@@ -112,36 +114,34 @@ def headline(track: Track, found: Values) -> Interval:
 
 
 def kept_share(part: Predictions, label: int, accepted: float = 0.95) -> float:
-    """Return the share of the held-out class that is rejected where a share `accepted` of the
-    trained classes is accepted; label: of the held-out class."""
+    """Return the share of the held-out class that is rejected.
+
+    The threshold accepts a share `accepted` of the trained classes. label: of the held-out class.
+    """
     scores = part.probabilities[:, label]
     held_out = part.label == label
     return float(np.mean(scores[held_out] > np.quantile(scores[~held_out], accepted)))
 
 
 def scores(track: Track, answers: list[np.ndarray], baselines: dict[str, np.ndarray]) -> dict:
-    """Return all scores of a method; answers: probabilities (samples, classes) of each training
-    seed.
+    """Return all scores of a method.
 
+    answers: probabilities (samples, classes) of each training seed.
     baselines: kept values (seeds, models) by the baseline's name.
     """
     facts, classes = track.samples()
-    parts = [tested(track, facts, np.asarray(shares, float)) for shares in answers]
+    parts = [tested(track, facts, np.asarray(of_seed, float)) for of_seed in answers]
     found = values_of(track, parts, classes)
     generator = stream(named_seed(MAIN), "benchmark-f1", track.name)
     f1 = f1_by_snr(parts, len(classes), track.whole, generator)
     right = np.mean([part.correct for part in parts], axis=0)
-    shares = {
-        name: {
-            f"{key:g}" if isinstance(key, float) else key: 100 * share
-            for key, (share, _) in accuracy_by(groups, right).items()
-        }
-        for name, groups in (
-            ("by_snr_percent", facts.snr_db),
-            ("by_subtype_percent", facts.subtype),
-        )
-    }
-    more = {}
+    by_snr = {}
+    for snr, (share, _) in accuracy_by(facts.snr_db, right).items():
+        by_snr[f"{snr:g}"] = 100 * share
+    by_name = {}
+    for subtype, (share, _) in accuracy_by(facts.subtype, right).items():
+        by_name[subtype] = 100 * share
+    more: dict = {}
     if track.whole:
         more |= by_subtype(found.values, found.weight, found.subtypes)
     if track.headline == "AUROC":
@@ -156,6 +156,7 @@ def scores(track: Track, answers: list[np.ndarray], baselines: dict[str, np.ndar
         "accuracy_percent": 100 * float(right.mean()),
         "macro_f1_percent": Interval(*(100 * value for value in f1["avg"])),
         **more,
-        **shares,
+        "by_snr_percent": by_snr,
+        "by_subtype_percent": by_name,
         "differences": {name: difference(track, found, kept) for name, kept in baselines.items()},
     }

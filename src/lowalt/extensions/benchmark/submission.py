@@ -1,5 +1,4 @@
-"""A submission: a CSV file with the column `key` and a probability of each class for every test
-sample of a track.
+"""A submission: a CSV file with `key` and each class's probability for a track's test samples.
 
 Other columns are ignored, so a prediction file of a training is one as it stands. Its rows of other
 parts, marked in the column `part`, and rows of samples that the track does not test on are ignored
@@ -44,8 +43,7 @@ def _shares(row: dict, columns: tuple[str, ...], where: str) -> list[float]:
 
 
 def read(path: str | Path, track: Track) -> np.ndarray:
-    """Return the probabilities (samples, classes) of a submission, in the order of the track's test
-    samples.
+    """Return the probabilities (samples, classes) of a submission, in the order of the track.
 
     Raises: InputError in one sentence for a missing column, a value that is no probability, a row
     that does not sum to one, and a key that is unknown, stands twice, or is missing.
@@ -62,23 +60,25 @@ def read(path: str | Path, track: Track) -> np.ndarray:
             continue
         if key not in known:
             raise InputError(
-                f"{where}: key {shown(key)} is no sample of the track {track.name}, such as {tested[0]}"
+                f"{where}: key {shown(key)} is no sample of the track {track.name}, such as "
+                f"{tested[0]}"
             )
         if key in found:
             raise InputError(f"{where}: key {key} stands twice, expected one row per sample")
         found[key] = _shares(row, columns, where)
-    if missing := [key for key in tested if key not in found]:
+    missing = [key for key in tested if key not in found]
+    if missing:
         raise InputError(
-            f"{path}: {len(missing)} of the {len(tested)} test samples of the track {track.name} are missing, the "
-            f"first is {missing[0]}"
+            f"{path}: {len(missing)} of the {len(tested)} test samples of the track {track.name} "
+            f"are missing, the first is {missing[0]}"
         )
     return np.array([found[key] for key in tested])
 
 
 def write(path: str | Path, samples: "TrackSamples", probabilities: np.ndarray) -> None:
-    """Write a submission. probabilities: (n, classes), in the order of the samples and of their
-    classes.
+    """Write a submission.
 
+    probabilities: (n, classes), in the order of the samples and of their classes.
     Raises: InputError for another shape, and for a row that `read` would refuse, such as one of
     logits.
     """

@@ -1,5 +1,4 @@
-"""Rows that others submit: a folder of submissions is scored anew, and its table is written from it
-alone.
+"""Rows that others submit: a folder of submissions is scored anew and its table written from it.
 
 A submission is a folder NAME with card.yaml and a file of answers TRACK-SEED.csv per track and
 training seed. The card has one line for each of CARD, and perhaps `confirmed`: by track, what
@@ -53,6 +52,8 @@ COLUMNS = (
     "answers_sha256",
     "code",
 )
+PLAIN = re.compile(r"[^\W_][^<>|=`\x00-\x1f\x7f]*")
+"""Texts of a card that enter the table: no formula of a table calculation, no markup of a page."""
 ANSWERS = re.compile(r"(?P<track>[a-z0-9-]+)-(?P<seed>\d+)\.csv")
 
 
@@ -76,6 +77,12 @@ def read(folder: str | Path) -> Submission:
         raise InputError(
             f"{folder}/card.yaml: missing {missing}, unknown {unknown}, expected {list(CARD)}"
         )
+    for name in ("method", "chosen_on", "code"):
+        if not PLAIN.fullmatch(str(card[name])):
+            raise InputError(
+                f"{folder}/card.yaml: {name} is {shown(card[name])}, expected text that begins with a "
+                "letter or digit, without <>|=` and control characters"
+            )
     answers: dict[str, list[Path]] = {}
     for path in sorted(folder.glob("*.csv")):
         found = ANSWERS.fullmatch(path.name)
@@ -92,8 +99,9 @@ def read(folder: str | Path) -> Submission:
 
 
 def row(submitted: Submission, track: Track) -> dict:
-    """Return the table's row of a submission on a track, scored from its files. Raises: as
-    `submission.read`.
+    """Return the table's row of a submission on a track, scored from its files.
+
+    Raises: as `submission.read`.
     """
     paths = submitted.answers[track.name]
     found = scores(track, [submission.read(path, track) for path in paths], {})

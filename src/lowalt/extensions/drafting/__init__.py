@@ -1,1 +1,1 @@
-"""Drafting: from a user's mesh or robot description to the draft of a record (`lowalt target new`)."""
+"""Drafting: from a mesh or a robot's description to a draft of a record (`lowalt target new`)."""

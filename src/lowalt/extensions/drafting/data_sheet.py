@@ -34,11 +34,12 @@ SIZES = {
     },
 }
 EXAMPLES = {
-    "drone": "lowalt target drone --rotors 6 --diagonal 1.13 --propeller 0.53 --blades 2 --rate 50:120 --speed 18 "
-    "--out m600.yaml",
-    "bird": "lowalt target bird --length 0.46 --span 0.99 --rate 3:5 --speed 13 --out carrion-crow.yaml",
-    "vehicle": "lowalt target vehicle --length 4.63 --width 1.85 --height 1.44 --wheel 0.67 --wheel-base 2.85 "
-    "--speed 30 --out sedan.yaml",
+    "drone": "lowalt target drone --rotors 6 --diagonal 1.13 --propeller 0.53 --blades 2 --rate "
+    "50:120 --speed 18 --out m600.yaml",
+    "bird": "lowalt target bird --length 0.46 --span 0.99 --rate 3:5 --speed 13 --out "
+    "carrion-crow.yaml",
+    "vehicle": "lowalt target vehicle --length 4.63 --width 1.85 --height 1.44 --wheel 0.67 "
+    "--wheel-base 2.85 --speed 30 --out sedan.yaml",
 }
 FRAMES = {"drone": "radial", "bird": "bird", "vehicle": "car"}
 """Usual frame of each kind."""
@@ -54,12 +55,8 @@ def add_sheets(actions: argparse._SubParsersAction) -> None:
         )
         line.set_defaults(kind=kind)
         for word, meaning in sizes.items():
-            line.add_argument(
-                f"--{word}",
-                type=int if word in ("rotors", "blades") else metres,
-                required=True,
-                help=meaning,
-            )
+            kind_of_number = int if word in ("rotors", "blades") else metres
+            line.add_argument(f"--{word}", type=kind_of_number, required=True, help=meaning)
         if kind != "vehicle":
             line.add_argument(
                 "--rate",

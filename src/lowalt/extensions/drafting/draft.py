@@ -29,8 +29,11 @@ CONFIRM = "  # GUESSED, please confirm"
 def record_text(
     about: list[str], subtype: str, row: list[str], settings: dict[str, str], parts: list[str]
 ) -> str:
-    """Return a record file's text for a mesh: what it is about, then the subtype with a row of its
-    own, settings and parts, each line of `row` and `parts` as it stands in the file."""
+    """Return a record file's text for a mesh.
+
+    It has what the record is about, then the subtype with a row of its own, settings and parts,
+    each line of `row` and `parts` as it stands in the file.
+    """
     name = yaml.safe_dump(subtype).splitlines()[0]
     lines = [f"# {line}" for line in about]
     lines += [f"{name}:", "  source: mesh", *row]
@@ -40,24 +43,21 @@ def record_text(
 
 
 DIGITS = 5
-"""Lengths in a draft are exact to this many digits of the target's size, wherever the file's origin
-lies.
-"""
+"""Lengths in a draft have this many digits of the target's size, wherever the origin lies."""
 
 
-def _places(size: float) -> int:
-    """How many decimal places of a length (m) a target of a size (m) needs."""
-    return max(0, DIGITS - 1 - int(np.floor(np.log10(size))))
+def _number(value: float, size: float) -> str:
+    """A length (m) as text, exact enough for a target of a size (m).
 
-
-def _number(value: float, places: int) -> str:
-    """A length as text; georeferenced coordinates keep all their digits."""
-    return f"{round(float(value), places) + 0.0:.15g}"
+    Georeferenced coordinates keep all their digits.
+    """
+    decimals = max(0, DIGITS - 1 - int(np.floor(np.log10(size))))
+    return f"{round(float(value), decimals) + 0.0:.15g}"
 
 
 def numbers(values: np.ndarray, size: float) -> str:
     """Return lengths (m) as a YAML list, exact enough for a target of a size (m)."""
-    return "[" + ", ".join(_number(value, _places(size)) for value in values) + "]"
+    return "[" + ", ".join(_number(value, size) for value in values) + "]"
 
 
 def _position(group: Group, inspection: Inspection) -> str:
@@ -77,14 +77,17 @@ def _diagonal(hubs: np.ndarray) -> float:
 
 
 def size_word(category: str, extent: np.ndarray, hubs: np.ndarray) -> str:
-    """Return what the size of a target measures, as a word of the record's `size_is`: of a plane,
-    its span.
+    """Return what the size of a target measures, as a word of the record's `size_is`.
+
+    Of a plane it is the span.
     """
     if category == "Vehicle":
         return ALL_AXES
     if category == "Bird":
         return "length"
-    return "motor diagonal" if 2 * _diagonal(hubs) > extent.max() else "largest extent"
+    if 2 * _diagonal(hubs) > extent.max():
+        return "motor diagonal"
+    return "largest extent"
 
 
 def row_lines(
@@ -94,11 +97,13 @@ def row_lines(
     wheel_m: float | None,
     table: dict[str, dict],
 ) -> list[str]:
-    """Return the lines of a row for a target that the table lacks: its size is the file's, its
-    rates and speeds are those of the target of its category that is nearest in size.
+    """Return the lines of a row for a target that the table lacks.
 
-    extent: (3,) m along right, front and up; hubs: (R, 2) m, the rotors' in plan, or the places of
-    its wheels; wheel_m: diameter of a wheel.
+    Its size is the file's; its rates and speeds are those of the target of its category that is
+    nearest in size.
+
+    extent: (3,) m along right, front and up; hubs: (R, 2) m, the rotors' in plan, or its wheels'
+    positions; wheel_m: diameter of a wheel.
     """
     width, length, height = extent
     key = "size_m"
@@ -113,13 +118,14 @@ def row_lines(
         sizes = {key: _diagonal(hubs)}
     rows = [row for row in table.values() if row["category"] == category]
     near = min(rows, key=lambda row: abs(np.log(row[key] / sizes[key])))
-    cells = {"category": category}
+    cells: dict[str, object] = {"category": category}
     for name, value in sizes.items():
         if value:
             cells[name] = float(f"{value:.4g}")
     count = 2 if category == "Bird" else len(hubs)
     if count:
         cells["n_rotors_or_wings"] = count
+    speeds: tuple[str, ...]
     if category in AIRBORNE:
         speeds = ("vx_abs_max", "vy_abs_max", "vz_abs_max")
     else:
@@ -133,9 +139,9 @@ def row_lines(
 
 
 def _wings(inspection: Inspection) -> list[str]:
-    """Return the lines of two wings without elbows. Each begins at `shoulder_m`; its hinge is the
-    middle of its root.
+    """Return the lines of two wings without elbows.
 
+    Each begins at `shoulder_m`; its hinge is the middle of its root.
     Raises: InputError where the two sides do not mirror one another.
     """
     size = float((inspection.high - inspection.low).max())
@@ -148,26 +154,28 @@ def _wings(inspection: Inspection) -> list[str]:
     mirrored_points = inspection.points.copy()
     mirrored_points[:, right] = 2 * middle - mirrored_points[:, right]
     outer = np.abs(inspection.points[:, right] - middle) > inspection.shoulder_m
-    off = cKDTree(mirrored_points).query(inspection.points[outer])[0]
-    if not outer.any() or off.mean() > WINGS_ALIKE * size:
+    off, _ = cKDTree(mirrored_points).query(inspection.points[outer])
+    if not outer.any() or np.mean(off) > WINGS_ALIKE * size:
         raise InputError(
-            f"{inspection.path}: its sides along {'xyz'[right]} do not mirror one another, expected two "
-            "wings: is one missing, or is --up or --front another axis?"
+            f"{inspection.path}: its sides along {'xyz'[right]} do not mirror one another, "
+            "expected two wings: is one missing, or is --up or --front another axis?"
         )
     for name, side in (("left wing", -sign), ("right wing", sign)):
         out = side * (inspection.points[:, right] - middle)
         at_root = (out > inspection.shoulder_m) & (out < 1.3 * inspection.shoulder_m)
         root = inspection.points[at_root]
-        hinge = np.median(root, axis=0) if len(root) else (inspection.low + inspection.high) / 2
+        hinge = (inspection.low + inspection.high) / 2
+        if len(root):
+            hinge = np.median(root, axis=0)
         hinge[right] = middle + side * inspection.shoulder_m
         corners = [["null"] * 3, ["null"] * 3]
         inner = 0 if side > 0 else 1
-        corners[inner][right] = _number(hinge[right], _places(size))
+        corners[inner][right] = _number(hinge[right], size)
         # Tail feathers may spread as wide as the wing's root, behind it.
         along = inspection.points[out > 0.4 * out.max(), front]
         slack = 0.25 * np.ptp(along)
-        corners[0][front] = _number(along.min() - slack, _places(size))
-        corners[1][front] = _number(along.max() + slack, _places(size))
+        corners[0][front] = _number(along.min() - slack, size)
+        corners[1][front] = _number(along.max() + slack, size)
         box = ", ".join("[" + ", ".join(corner) + "]" for corner in corners)
         region = f"region: {{box: [{box}]}}"
         lines.append(
@@ -177,16 +185,21 @@ def _wings(inspection: Inspection) -> list[str]:
 
 
 def alternating(hubs: np.ndarray) -> list[str]:
-    """Return senses ccw and cw in turn for rotors in their order around their middle, hubs (R, 2)."""
+    """Return senses ccw and cw in turn for rotors around their middle.
+
+    hubs: (R, 2) in plan.
+    """
     if not len(hubs):
         return []
     order = np.argsort(np.arctan2(*(hubs - portable.mean(hubs, 0)).T), kind="stable")
-    return [("ccw", "cw")[int(place) % 2] for place in np.argsort(order, kind="stable")]
+    turns = np.argsort(order, kind="stable")
+    return [("ccw", "cw")[turn % 2] for turn in turns.tolist()]
 
 
 def mirrored(groups: list[Group]) -> bool:
-    """Return whether groups are three or more alike pieces whose centres mirror one another, none
-    near their middle: the propellers of a multirotor, the wheels of a car.
+    """Return whether groups are three or more copies whose centres mirror one another.
+
+    None may lie near their middle. Such are the propellers of a multirotor, the wheels of a car.
     """
     if len(groups) < 3 or any(not alike(groups[0], group) for group in groups):
         return False
@@ -208,8 +221,9 @@ def mirrored(groups: list[Group]) -> bool:
 def refuse_miscount(
     inspection: Inspection, groups: list[Group], count: int | None, picture: str
 ) -> None:
-    """Refuse a target whose number of rotors or wheels is wrong. Where the number is not known,
-    names must tell it, or the parts must mirror one another.
+    """Refuse a target whose number of rotors or wheels is wrong.
+
+    Where the number is not known, names must tell it, or the parts must mirror one another.
 
     Raises: InputError naming what was found, the numbered picture and the option to write.
     """
@@ -237,8 +251,7 @@ def refuse_miscount(
 
 
 def chosen(inspection: Inspection, words: list[str]) -> list[Group]:
-    """Return the groups of components that words such as 5+6 number, from 1 in the order of an
-    inspection.
+    """Return the groups of components that words such as 5+6 number, from 1 as an inspection does.
 
     Raises: InputError naming the word that is no such number.
     """
@@ -275,7 +288,9 @@ def drafted(
     hubs = np.array([frame[:2] @ group.centre for group in groups]).reshape(-1, 2)
     extent = np.abs(frame @ (inspection.high - inspection.low))
     wheel_m = max((float(group.extent.max()) for group in groups), default=None)
-    row = row_lines(category, extent, hubs, wheel_m, table) if subtype not in table else []
+    row = []
+    if subtype not in table:
+        row = row_lines(category, extent, hubs, wheel_m, table)
     size = float((inspection.high - inspection.low).max())
     if "up" in stated_axes:
         up_mark = ""

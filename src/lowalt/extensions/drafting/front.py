@@ -1,5 +1,4 @@
-"""Which way the front of a target points: what its parts, their names and its shape say, and
-whether they agree.
+"""Which way the front of a target points: what its parts, names and shape say about it.
 
 Strong evidence are names such as front_left, wheel axles and the axes of propellers. Weak evidence
 is the shape alone: a mirror plane, the long axis of a car, the span of a plane without lift rotors.
@@ -11,25 +10,25 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from lowalt.config.classes import listed
 from lowalt.extensions.drafting.guesses import ASYMMETRIC, SYMMETRIC, off_mirror
 from lowalt.files.errors import InputError
 
 LEVEL = 0.5
 ALONG = 0.9
-"""Cosines: an axis is horizontal if its cosine to `up` is below LEVEL, and along an axis of the
-file from ALONG on.
-"""
+"""Cosines: an axis is horizontal below LEVEL to `up`, along an axis of the file from ALONG on."""
 
 CLEAR = 2.0
 OFF_MIDDLE = 0.05
-"""A direction lies along one of the two horizontal axes if its part there is at least CLEAR times
-that along the other, and OFF_MIDDLE times the target's largest extent."""
+"""A direction lies along one of the two horizontal axes if its component there is large enough.
+
+It must be at least CLEAR times the component along the other axis, and OFF_MIDDLE times the
+target's largest extent.
+"""
 
 LONG_CAR = 1.2
 LONG_WING = 1.5
-"""Least ratio of the horizontal extents at which the longer is a vehicle's length or a plane's
-span.
-"""
+"""Least ratio of horizontal extents at which the longer is a car's length or a plane's span."""
 
 NOTHING_TELLS = "no part tells"
 SPAN = "the span"
@@ -47,8 +46,10 @@ WORDS = {
 
 @dataclass(frozen=True)
 class Turning:
-    """A rotor or wheel along the file's axes: its `name`, its `hub` (3,) m, and its `axis` (3,) of
-    length one, whose sign counts where it is `signed`."""
+    """A rotor or wheel along the file's axes.
+
+    hub: (3,) m; axis: (3,) of length one, whose sign counts where it is `signed`.
+    """
 
     name: str
     hub: np.ndarray
@@ -58,9 +59,11 @@ class Turning:
 
 @dataclass(frozen=True)
 class Shape:
-    """What is seen of a target along its file's axes: its `category`, `up` (3,) of length one,
-    `points` (N, 3) m of its surface, the centre (3,) m of each of its parts by name, the parts that
-    turn, and the centres of steered wheels."""
+    """What is seen of a target along its file's axes.
+
+    up: (3,) of length one; points: (N, 3) m of its surface; named: the centre (3,) m of each of its
+    parts by name; turning: the parts that turn; steered: the centres of steered wheels.
+    """
 
     category: str
     up: np.ndarray
@@ -72,9 +75,11 @@ class Shape:
 
 @dataclass(frozen=True)
 class Evidence:
-    """A reason, in `words`, for a front along the `axis` (0 to 2): towards `sign`, or either way
-    where that is 0, and then rather towards `hint`. A front that contradicts `binding` evidence
-    cannot be made."""
+    """A reason, in `words`, for a front along the `axis` (0 to 2).
+
+    The front points towards `sign`, or either way where that is 0, and then rather towards `hint`.
+    A front that contradicts `binding` evidence cannot be made.
+    """
 
     words: str
     axis: int
@@ -86,9 +91,7 @@ class Evidence:
 
 @dataclass(frozen=True)
 class Front:
-    """The front of a target: an axis such as "-y", the reasons in `words`, and whether it is
-    `sure`.
-    """
+    """The front of a target: an axis such as "-y", the reasons in `words`, whether it is `sure`."""
 
     axis: str
     words: str
@@ -97,9 +100,11 @@ class Front:
     @property
     def comment(self) -> str:
         """The comment that the line of a draft ends in."""
-        other = self.axis[1:] if self.axis[0] == "-" else f"-{self.axis}"
+        if self.sure and self.words:
+            return f"  # {self.words}"
         if self.sure:
-            return f"  # {self.words}" * bool(self.words)
+            return ""
+        other = f"-{self.axis}".removeprefix("--")
         return f"  # GUESSED, please confirm: {self.axis} or {other}; {self.words}"
 
 
@@ -109,7 +114,7 @@ def _axis(number: int, sign: int) -> str:
 
 
 def _clear(way: np.ndarray, level: list[int], size: float) -> tuple[int, int] | None:
-    """The axis along which a direction (3,) m clearly lies, and its sign; None where it does not."""
+    """The axis along which a direction (3,) m clearly lies, and its sign; None where none does."""
     first, second = sorted(level, key=lambda axis: -abs(way[axis]))
     if abs(way[first]) < max(CLEAR * abs(way[second]), OFF_MIDDLE * size):
         return None
@@ -139,8 +144,10 @@ def _suiting(
     ways: dict[str, np.ndarray],
     least_m: float,
 ) -> list[tuple[int, int]]:
-    """Which fronts, by their directions ahead (3,), suit the ways (3,) m to the front and to the
-    right by at least least_m; none where one of the two is unknown.
+    """Which fronts suit the ways (3,) m to the front and to the right.
+
+    ahead: their directions (3,). A front suits both by at least least_m; none does where one of the
+    two ways is unknown.
     """
     if len(ways) < 2:
         return []
@@ -168,8 +175,9 @@ def _from_names(
             ways[word] = end - opposite_end
             examples[word] = (names or opposite_names)[0]
     # Left and right may be the viewer's, so they count only where front and rear do not tell.
-    if "front" in ways and (clear := _clear(ways["front"], level, size)):
-        yield Evidence(f"names such as {examples['front']!r}", *clear)
+    ahead_of_rear = "front" in ways and _clear(ways["front"], level, size)
+    if ahead_of_rear:
+        yield Evidence(f"names such as {examples['front']!r}", *ahead_of_rear)
         return
     ahead = {}
     for axis in level:
@@ -181,9 +189,10 @@ def _from_names(
     if len(fits) == 1:
         yield Evidence(f"names such as {examples['front']!r}", *fits[0])
         return
-    if "right" in ways and (clear := _clear(ways["right"], level, size)):
+    right_of_left = "right" in ways and _clear(ways["right"], level, size)
+    if right_of_left:
         for front, along in ahead.items():
-            if np.cross(along, shape.up) @ ahead[clear] > LEVEL:
+            if np.cross(along, shape.up) @ ahead[right_of_left] > LEVEL:
                 yield Evidence(f"names such as {examples['right']!r}", *front)
                 return
 
@@ -197,13 +206,15 @@ def _from_wheels(shape: Shape, level: list[int], size: float) -> Iterator[Eviden
     if shape.steered and len(shape.steered) < len(shape.turning):
         middle = np.mean([part.hub for part in shape.turning], axis=0)
         way = np.mean(shape.steered, axis=0) - middle
-        if along := _clear(way, level, size):
+        along = _clear(way, level, size)
+        if along:
             yield Evidence("the steered wheels", *along)
 
 
 def _from_propellers(shape: Shape, level: list[int], size: float) -> Iterator[Evidence]:
-    """What propellers with level axes say; the tail rotor of a helicopter points sideways, behind
-    the main rotor.
+    """What propellers with level axes say.
+
+    The tail rotor of a helicopter points sideways, behind the main rotor.
     """
     upright = [part for part in shape.turning if abs(part.axis @ shape.up) > LEVEL]
     others = [part for part in shape.turning if abs(part.axis @ shape.up) <= LEVEL]
@@ -252,8 +263,9 @@ def evidence(shape: Shape) -> list[Evidence]:
 
 
 def _refuse_given(given: str, found: list[Evidence]) -> None:
-    """Refuse a given front that contradicts binding evidence. Raises: InputError naming the option
-    that resolves it.
+    """Refuse a given front that contradicts binding evidence.
+
+    Raises: InputError naming the option that resolves it.
     """
     for item in found:
         ahead = "xyz"[item.axis]
@@ -297,8 +309,7 @@ def front_of(shape: Shape, given: str | None, usual: str | None, otherwise: str)
         return Front(otherwise, NOTHING_TELLS, False)
     axis = found[0].axis
     agreeing = [item for item in found if item.axis == axis]
-    *others, last = dict.fromkeys(item.words for item in agreeing)
-    words = f"{', '.join(others)} and {last}" if others else last
+    words = listed(dict.fromkeys(item.words for item in agreeing))
     if ways:
         return Front(next(iter(ways)), words, True)
     if usual and usual[-1] == "xyz"[axis]:

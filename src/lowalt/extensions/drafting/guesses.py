@@ -1,6 +1,4 @@
-"""Guesses on a mesh that the file does not state: its unit, its axes, and what its connected
-components may be.
-"""
+"""Guesses on what a mesh file does not state: unit, axes, and kinds of connected components."""
 
 import re
 from collections.abc import Sequence
@@ -134,8 +132,9 @@ class Component:
 
 
 class Group(tuple[Component, ...]):
-    """Components that may be one moving part, such as the blades of a rotor; properties as those of
-    a component.
+    """Components that may be one moving part, such as the blades of a rotor.
+
+    Its properties are those of a component.
     """
 
     low = property(lambda self: np.min([part.low for part in self], axis=0))
@@ -174,8 +173,9 @@ def guessed_unit(extents: np.ndarray, category: str, wanted_m: float | None = No
 
 
 def off_mirror(points: np.ndarray) -> np.ndarray:
-    """Return the mean distance (3,) of points (N, 3) from their mirror image along each axis, over
-    their size.
+    """Return the mean distance (3,) of points (N, 3) from their mirror image along each axis.
+
+    It is relative to their size.
     """
     tree = cKDTree(points)
     off = []
@@ -187,8 +187,9 @@ def off_mirror(points: np.ndarray) -> np.ndarray:
 
 
 def mirror_axis(points: np.ndarray) -> int | None:
-    """Return the only axis along which a body of points (N, 3) is its own mirror image: left and
-    right of a bird.
+    """Return the only axis along which a body of points (N, 3) is its own mirror image.
+
+    Such are left and right of a bird.
 
     Return None if there is no such axis or more than one.
     """
@@ -200,8 +201,7 @@ def mirror_axis(points: np.ndarray) -> int | None:
 
 
 def cut_axis(mesh: Mesh, points: np.ndarray, axes: Sequence[int]) -> int | None:
-    """Return the axis along which a target is cut in half, if the mesh holds one half only; None if
-    it seems whole.
+    """Return the axis along which a target is cut in half, None if it seems whole.
 
     points: (N, 3) m on its surface. A half is not its own mirror image along that axis. It ends in
     a plane, where its surface is open or which passes through the origin of the file.
@@ -228,9 +228,9 @@ def cut_axis(mesh: Mesh, points: np.ndarray, axes: Sequence[int]) -> int | None:
 def guessed_axes(
     extent: np.ndarray, category: str, up: int | None = None, right: int | None = None
 ) -> tuple[str, str]:
-    """Return the axes of the file that may point up and to the front, without signs, from the
-    extents (3,) alone.
+    """Return the axes of the file that may point up and to the front, from the extents (3,) alone.
 
+    They have no signs.
     The smallest extent points up. The largest points to the front of a vehicle, and across a bird
     with spread wings.
     up, right: numbers of axes that are already known.
@@ -249,19 +249,26 @@ def guessed_axes(
 
 
 def alike(first: Component | Group, second: Component | Group) -> bool:
-    """Return whether two components are copies: of the same three sizes in any order, to within
-    ALIKE, or of the same number of triangles and area, as propellers at different angles are, whose
-    boxes differ."""
-    a = np.sort(first.extent)
-    b = np.sort(second.extent)
-    areas = (first.area, second.area)
-    copies = first.triangles == second.triangles and abs(areas[0] - areas[1]) <= ALIKE * max(areas)
-    return copies or bool((abs(a - b) <= ALIKE * max(a[2], b[2])).all())
+    """Return whether two components are copies.
+
+    Copies have the same three sizes in any order, to within ALIKE, or the same number of triangles
+    and area, as propellers at different angles, whose boxes differ.
+    """
+    difference = abs(first.area - second.area)
+    same_area = difference <= ALIKE * max(first.area, second.area)
+    if first.triangles == second.triangles and same_area:
+        return True
+    sizes = np.sort(first.extent)
+    other_sizes = np.sort(second.extent)
+    largest = max(sizes[2], other_sizes[2])
+    return bool((abs(sizes - other_sizes) <= ALIKE * largest).all())
 
 
 def _one_hub(first: Component, second: Component, up: int, touching: bool) -> bool:
-    """Return whether two components turn about one hub: one is centred on the other, as a spinner
-    on a propeller, and they are not a pair of coaxial rotors.
+    """Return whether two components turn about one hub.
+
+    One is centred on the other, as a spinner on a propeller, and they are not a pair of coaxial
+    rotors.
 
     touching: whether long blades that touch, unlike discs, share a hub too.
     """
@@ -325,8 +332,7 @@ def _is_rotor(group: Group, axes: Sequence[int], whole: np.ndarray) -> bool:
 
 
 def turning_axis(group: Group, up: int, low: np.ndarray, high: np.ndarray) -> int:
-    """Return the axis of the file about which a rotor or wheel turns: the one along which it is
-    thinnest.
+    """Return the axis along which a rotor or wheel is thinnest, and about which it turns.
 
     Two blades may be thinner along their chord than along their axis. A rotor wider than half the
     craft is therefore taken to turn about the axis `up`, and a tail rotor about the horizontal axis
@@ -348,8 +354,9 @@ def turning_axis(group: Group, up: int, low: np.ndarray, high: np.ndarray) -> in
 def rotors(
     parts: Sequence[Component], ups: Sequence[int], whole: np.ndarray, count: int | None
 ) -> tuple[int, list[Group]]:
-    """Return the axis that points up, and the groups of components that may be rotors: `count` of
-    them, or none.
+    """Return the axis that points up, and the groups of components that may be rotors.
+
+    There are `count` groups, or none.
 
     Pieces named as rotors are tried first, whatever their axes. Without such names, rotors are a
     set of at least three alike flat groups, each around its own hub. Of several sets the one
@@ -382,14 +389,17 @@ def rotors(
 
 
 def _grouped(parts: Sequence[Component], up: int, count: int | None) -> list[list[Group]]:
-    """Return possible groupings of components by hub: by nearness and, where the number of rotors
-    is known, also in `count` groups with the same number of alike blades each, clustered by their
-    centres.
+    """Return possible groupings of components by hub.
+
+    They are grouped by nearness and, where the number of rotors is known, also into `count` groups
+    with the same number of alike blades each, clustered by their centres.
     """
     # If the number is known, propellers that touch stay apart; otherwise blades that touch are one
     # rotor.
     ways = [clusters(parts, up, touching=not count)]
-    for index, part in enumerate(parts if count else ()):
+    if not count:
+        return ways
+    for index, part in enumerate(parts):
         same = [other for other in parts if alike(part, other)]
         blades, odd = divmod(len(same), count)
         if odd or not 2 <= blades <= 6 or any(other is same[0] for other in parts[:index]):
@@ -407,8 +417,9 @@ def _grouped(parts: Sequence[Component], up: int, count: int | None) -> list[lis
 def _alike_set(
     choices: list[list[Group]], up: int, whole: np.ndarray, count: int | None
 ) -> list[Group]:
-    """The set of alike groups but arms that is farthest out: `count` groups, or two or more at one
-    height.
+    """The set of alike groups, except arms, that is farthest out.
+
+    It has `count` groups, or two or more at one height.
     """
     best: list[Group] = []
     farthest = 0.0
@@ -417,8 +428,13 @@ def _alike_set(
             same = [other for other in groups if alike(group, other)]
             height = group.centre[up]
             level = [other for other in same if abs(other.centre[up] - height) < 0.1 * whole.max()]
-            for able in (level, same) if count else (level,):
-                enough = len(able) == count if count else len(able) >= 2
+            candidates = [level]
+            if count:
+                candidates.append(same)
+            for able in candidates:
+                enough = len(able) >= 2
+                if count:
+                    enough = len(able) == count
                 in_plan = np.delete(np.array([member.centre for member in able]), up, axis=1)
                 reach = np.linalg.norm(in_plan - in_plan.mean(axis=0), axis=1).mean()
                 if enough and reach > farthest and not _are_arms(able, up):
@@ -428,9 +444,7 @@ def _alike_set(
 
 
 def _are_arms(groups: list[Group], up: int) -> bool:
-    """Whether all groups are slender pieces that point at the middle between them and reach near
-    it.
-    """
+    """Whether all groups are slender pieces that point at the middle and reach near it."""
     centres = np.delete(np.array([group.centre for group in groups]), up, axis=1)
     extents = np.delete(np.array([group.extent for group in groups]), up, axis=1)
     away = centres - centres.mean(axis=0)
@@ -443,8 +457,9 @@ def _are_arms(groups: list[Group], up: int) -> bool:
 
 
 def wheels(parts: Sequence[Component], whole: np.ndarray) -> list[Group]:
-    """Return the groups of components that may be wheels: those whose names say so, otherwise the
-    largest set of at least two alike round ones.
+    """Return the groups of components that may be wheels.
+
+    These are those whose names say so, otherwise the largest set of at least two alike round ones.
     """
     named = []
     for part in parts:
@@ -460,7 +475,9 @@ def wheels(parts: Sequence[Component], whole: np.ndarray) -> list[Group]:
         same = [other for other in able if alike(group, other)]
         if len(same) > len(best):
             best = same
-    return best if len(best) >= 2 else []
+    if len(best) < 2:
+        return []
+    return best
 
 
 def _round(extent: np.ndarray, whole: np.ndarray) -> bool:

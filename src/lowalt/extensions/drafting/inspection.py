@@ -1,9 +1,9 @@
-"""A first look at a user's mesh: its unit, extents, named pieces, connected components, and guesses
-on their kinds.
+"""A first look at a user's mesh: unit, extents, named pieces, connected components, guesses.
 
 Whatever the file does not state is called a guess (`guesses`). Nothing here changes a record.
 """
 
+import itertools
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -79,13 +79,12 @@ class Inspection:
         edges = np.linspace(0, across.max() * (1 + 1e-9), SLICES + 1)
         sizes = np.zeros((SLICES, 2))
         for index in range(SLICES):
-            inside = self.points[(across >= edges[index]) & (across < edges[index + 1])][
-                :, [up, front]
-            ]
-            sizes[index] = np.ptp(inside, axis=0) if len(inside) else 0.0
-        return float(
-            edges[np.flatnonzero((sizes >= 0.5 * sizes.max(axis=0)).all(axis=1)).max(initial=0) + 1]
-        )
+            in_slice = (across >= edges[index]) & (across < edges[index + 1])
+            if in_slice.any():
+                sizes[index] = np.ptp(self.points[in_slice][:, [up, front]], axis=0)
+        of_body = (sizes >= 0.5 * sizes.max(axis=0)).all(axis=1)
+        last = np.flatnonzero(of_body).max(initial=0)
+        return float(edges[last + 1])
 
 
 def components_of(mesh: Mesh, named: list[Piece], metre: float) -> list[guesses.Component]:
@@ -95,14 +94,11 @@ def components_of(mesh: Mesh, named: list[Piece], metre: float) -> list[guesses.
     smallest piece whose box holds it, or none.
     """
     slack = 1e-5 * np.ptp(mesh.vertices, axis=0).max()
-    boxes = [
-        (
-            piece.vertices.min(axis=0) * metre - slack,
-            piece.vertices.max(axis=0) * metre + slack,
-            ", ".join(piece.names),
-        )
-        for piece in named
-    ]
+    boxes = []
+    for piece in named:
+        base = piece.vertices.min(axis=0) * metre - slack
+        top = piece.vertices.max(axis=0) * metre + slack
+        boxes.append((base, top, ", ".join(piece.names)))
     result = []
     for number, closed in enumerate(mesh.closed.tolist()):
         triangles = mesh.vertices[mesh.faces[mesh.component == number]]
@@ -114,12 +110,11 @@ def components_of(mesh: Mesh, named: list[Piece], metre: float) -> list[guesses.
         middle = (areas[:, None] * (a + b + c)).sum(axis=0) / (3 * max(areas.sum(), 1e-300))
         spread, axes = np.linalg.eigh(np.cov(points.T))
         slender = float(np.sqrt(max(spread[1], 0.0) / max(spread[2], 1e-300)))
-        around = [
-            (float(np.prod(top - base)), name)
-            for base, top, name in boxes
-            if (low >= base).all() and (high <= top).all()
-        ]
-        names = min(around, default=(0.0, ""))[1]
+        around = []
+        for base, top, name in boxes:
+            if (low >= base).all() and (high <= top).all():
+                around.append((float(np.prod(top - base)), name))
+        _, names = min(around, default=(0.0, ""))
         shape = (middle, float(areas.sum()) / 2, axes[:, 2], slender)
         result.append(
             guesses.Component(number, low, high, len(triangles), closed, names, "", *shape)
@@ -130,27 +125,23 @@ def components_of(mesh: Mesh, named: list[Piece], metre: float) -> list[guesses.
 def _unit_of(
     path: Path, extents: np.ndarray, size_m: float | None, category: str, row: dict
 ) -> tuple[str | float, str]:
-    """The unit of a file with the extents (3,), and where it is from; size_m: its largest extent in
-    metres.
+    """The unit of a file with the extents (3,), and where it is from.
+
+    size_m: its largest extent in metres.
     """
-    stated = stated_unit_m(path)
     if size_m is not None:
         return float(f"{size_m / extents.max():.6g}"), "given by the size"
-    size, (low, high) = float(extents.max()), guesses.USUAL_M[category]
-    believed = stated is not None and (
-        path.suffix.lower() != ".glb" or low / BELIEVED <= size <= high * BELIEVED
-    )
-    if believed or (stated is not None and row.get("name")):
-        return {metre: name for name, metre in UNITS_M.items()}.get(
-            stated, stated
-        ), "stated by the file"
     wanted = row.get("len_m") if category == "Vehicle" else row.get("size_m")
-    why = (
-        "guessed from the size"
-        if stated is None
-        else "guessed: in glTF's metres no such target has this size"
-    )
-    return guesses.guessed_unit(extents, category, wanted), why
+    stated = stated_unit_m(path)
+    if stated is None:
+        return guesses.guessed_unit(extents, category, wanted), "guessed from the size"
+    low, high = guesses.USUAL_M[category]
+    believed = low / BELIEVED <= float(extents.max()) <= high * BELIEVED
+    if path.suffix.lower() != ".glb" or believed or row.get("name"):
+        unit_names = {metre: name for name, metre in UNITS_M.items()}
+        return unit_names.get(stated, stated), "stated by the file"
+    unit = guesses.guessed_unit(extents, category, wanted)
+    return unit, "guessed: in glTF's metres no such target has this size"
 
 
 def inspect_mesh(
@@ -162,8 +153,7 @@ def inspect_mesh(
     axes: tuple[str | None, str | None] = (None, None),
     usual: str | None = None,
 ) -> Inspection:
-    """Return the facts and guesses on a mesh file for a target of the category UAV, Bird or
-    Vehicle.
+    """Return the facts and guesses on a mesh file for a UAV, Bird or Vehicle.
 
     `unit`, `size_m` (the largest extent) and `axes` (up, front) are given where the user knows
     them. Otherwise the unit is the file's own statement or a guess from its sizes, for which the
@@ -177,13 +167,12 @@ def inspect_mesh(
     named = pieces(path)
     corners = np.concatenate([piece.vertices for piece in named] or [np.zeros((1, 3))])
     extents = np.maximum(np.ptp(corners, axis=0), 1e-12)
-    unit, source = (
-        (unit, "given") if unit is not None else _unit_of(path, extents, size_m, category, row)
-    )
+    source = "given"
+    if unit is None:
+        unit, source = _unit_of(path, extents, size_m, category, row)
     mesh = read_mesh(path, unit)
-    some = np.unique(
-        np.linspace(0, len(mesh.faces) - 1, min(len(mesh.faces), MOST_POINTS)).astype(int)
-    )
+    most = min(len(mesh.faces), MOST_POINTS)
+    some = np.unique(np.linspace(0, len(mesh.faces) - 1, most).astype(int))
     points = mesh.vertices[mesh.faces[some]].mean(axis=1)
     parts = components_of(mesh, named, metres(unit))
     low = mesh.vertices.min(axis=0)
@@ -195,16 +184,14 @@ def inspect_mesh(
         usual = "z"
     height = "xyz".index(up[-1])
     unit_vectors = np.eye(3)
-    upward = unit_vectors[height] * (-1 if up[0] == "-" else 1)
-    hubs = [
-        Turning(
-            group[0].piece,
-            group.centre,
-            unit_vectors[guesses.turning_axis(group, height, low, high)],
-        )
-        for group in groups
-    ]
-    shape = Shape(category, upward, points, _places(parts, named), hubs)
+    upward = unit_vectors[height]
+    if up[0] == "-":
+        upward = -upward
+    hubs = []
+    for group in groups:
+        axis = unit_vectors[guesses.turning_axis(group, height, low, high)]
+        hubs.append(Turning(group[0].piece, group.centre, axis))
+    shape = Shape(category, upward, points, _centres(parts, named), hubs)
     front = front_of(shape, axes[1], usual, guesses.guessed_axes(high - low, category, height)[1])
     sides_seen = category != "Bird" or None not in axes or front.words != NOTHING_TELLS
     ends = [
@@ -212,43 +199,45 @@ def inspect_mesh(
     ]
     cut = guesses.cut_axis(mesh, points, ends)
     kind = {"UAV": "rotor", "Vehicle": "wheel"}.get(category, "")
-    turning = {part.number for group in groups for part in group}
-    listed = [
-        (", ".join(piece.names), len(piece.faces), np.ptp(piece.vertices, axis=0) * metres(unit))
-        for piece in named
-    ]
+    turning = {part.number for part in itertools.chain.from_iterable(groups)}
+    guessed = [replace(part, guess=kind if part.number in turning else "") for part in parts]
+    listed = []
+    for piece in named:
+        extent = np.ptp(piece.vertices, axis=0) * metres(unit)
+        listed.append((", ".join(piece.names), len(piece.faces), extent))
     return Inspection(
-        path,
-        unit,
-        source,
-        low,
-        high,
-        len(mesh.faces),
-        up,
-        front.axis,
-        listed,
-        [replace(part, guess=kind if part.number in turning else "") for part in parts],
-        category,
-        points,
-        mesh.component[some],
-        groups,
-        sides_seen,
-        "" if cut is None else "xyz"[cut],
-        up_from,
-        front,
+        path=path,
+        unit=unit,
+        unit_from=source,
+        low=low,
+        high=high,
+        triangles=len(mesh.faces),
+        up=up,
+        front=front.axis,
+        pieces=listed,
+        components=guessed,
+        category=category,
+        points=points,
+        owner=mesh.component[some],
+        groups=groups,
+        sides_seen=sides_seen,
+        cut="" if cut is None else "xyz"[cut],
+        up_from=up_from,
+        front_from=front,
     )
 
 
-def _places(parts: list[guesses.Component], named: list[Piece]) -> dict[str, np.ndarray]:
+def _centres(parts: list[guesses.Component], named: list[Piece]) -> dict[str, np.ndarray]:
     """The centre (3,) m of the components of each piece whose name may say where it is, by name."""
     names = {", ".join(piece.names) for piece in named}
     if len(names) < 2:
         return {}
-    return {
-        name: np.mean([part.centre for part in parts if part.piece == name], axis=0)
-        for name in names
-        if any(part.piece == name for part in parts)
-    }
+    result = {}
+    for name in names:
+        centres = [part.centre for part in parts if part.piece == name]
+        if centres:
+            result[name] = np.mean(centres, axis=0)
+    return result
 
 
 def _upright(
@@ -265,46 +254,67 @@ def _upright(
     points: (N, 3) m on the surface; box: its lowest and highest corner; count: the number of rotors
     or wheels where it is known; axes: up and front where given.
     """
-    groups: list[guesses.Group] = []
     low, high = box
     extent = high - low
     stated = stated_up_axis(path)
-    given = [axes[0]] if axes[0] else [stated] if stated else []
-    front = axes[1] and "xyz".index(axes[1][-1])
-    ups = ["xyz".index(axis[-1]) for axis in given]
-    if not axes[0]:
-        ups += [
-            int(axis) for axis in np.argsort(extent, kind="stable") if axis not in (*ups, front)
-        ]
-    level = None
-    if category == "UAV" and count != 0:
-        level, groups = guesses.rotors(parts, ups, extent, count)
-        flat = {int(group.extent.argmin()) for group in groups}
-        if len(groups) > 2 and len(flat) == 1:
-            level = flat.pop()  # three rotors that lie flat tell more than a file's format
-    elif category == "Vehicle" and count != 0:
-        groups = guesses.wheels(parts, extent)
-        centres = np.array([group.centre for group in groups]).reshape(-1, 3)
-        if len(groups) > 2:
-            level = int(np.ptp(centres, axis=0).argmin())  # wheels stand on one level
-    if axes[0]:
-        return axes[0], "given", groups
+    given_up, given_front = axes
+    front = "xyz".index(given_front[-1]) if given_front else None
+    most_probable = given_up or stated
+    ups = []
+    if most_probable:
+        ups.append("xyz".index(most_probable[-1]))
+    if not given_up:
+        order = np.argsort(extent, kind="stable").tolist()
+        ups += [axis for axis in order if axis not in (*ups, front)]
+    level, groups = _turning(parts, ups, extent, category, count)
+    if given_up:
+        return given_up, "given", groups
     if stated and level in (None, "xyz".index(stated[-1])):
         return stated, "as the file's format defines it", groups
     if level is None or level == front:
         # The lowest extent is up, except along the axis that is known to be level: the front, or a
         # bird's right.
-        level_axis = guesses.mirror_axis(points) if front is None and category == "Bird" else front
+        level_axis = front
+        if front is None and category == "Bird":
+            level_axis = guesses.mirror_axis(points)
         level = "xyz".index(guesses.guessed_axes(extent, category, None, level_axis)[0])
-    height = (
-        np.mean([group.centre[level] for group in groups]) - (low + high)[level] / 2
-        if groups
-        else 0.0
-    )
-    # Rotors stand in the upper half and wheels in the lower one; some files have their down axis
-    # first.
-    down = height < -1e-9 * extent[level] if category == "UAV" else height > 1e-9 * extent[level]
-    return "-" * bool(down) + "xyz"[level], "guessed from its parts and extents", groups
+    up = "xyz"[level]
+    if groups:
+        # Rotors stand in the upper half and wheels in the lower one; some files have their down
+        # axis first.
+        height = np.mean([group.centre[level] for group in groups]) - (low + high)[level] / 2
+        upside = height if category == "UAV" else -height
+        if upside < -1e-9 * extent[level]:
+            up = f"-{up}"
+    return up, "guessed from its parts and extents", groups
+
+
+def _turning(
+    parts: list[guesses.Component],
+    ups: list[int],
+    extent: np.ndarray,
+    category: str,
+    count: int | None,
+) -> tuple[int | None, list[guesses.Group]]:
+    """The axis up as rotors or wheels tell it, None where they do not, and the groups of them.
+
+    ups: numbers of axes that may be up, the most probable first.
+    """
+    if count == 0 or category == "Bird":
+        return None, []
+    if category == "Vehicle":
+        groups = guesses.wheels(parts, extent)
+        if len(groups) <= 2:
+            return None, groups
+        # Wheels stand on one level.
+        centres = np.array([group.centre for group in groups])
+        return int(np.ptp(centres, axis=0).argmin()), groups
+    level, groups = guesses.rotors(parts, ups, extent, count)
+    flat = {int(group.extent.argmin()) for group in groups}
+    if len(groups) > 2 and len(flat) == 1:
+        # Three rotors that lie flat tell more than a file's format.
+        level = flat.pop()
+    return level, groups
 
 
 def _size(values: np.ndarray) -> str:
@@ -313,12 +323,15 @@ def _size(values: np.ndarray) -> str:
 
 
 def described(inspection: Inspection, most: int = 30) -> str:
-    """Return an inspection as text, at most `most` components, the largest and those with a guess
-    first.
+    """Return an inspection as text, with at most `most` components.
+
+    The largest components and those with a guess come first.
     """
-    low, high = (np.round(corner, 4).tolist() for corner in (inspection.low, inspection.high))
+    low = np.round(inspection.low, 4).tolist()
+    high = np.round(inspection.high, 4).tolist()
     lines = [
-        f"{inspection.path}: {inspection.triangles} triangles, {len(inspection.components)} connected components",
+        f"{inspection.path}: {inspection.triangles} triangles, {len(inspection.components)} "
+        "connected components",
         f"category {inspection.category} (give --category where it is another)",
         f"unit     {inspection.unit} ({inspection.unit_from})",
         f"extent   {_size(inspection.high - inspection.low)} m along x, y, z, from {low} to {high}",
@@ -348,6 +361,6 @@ def described(inspection: Inspection, most: int = 30) -> str:
             f"  {number} {part.piece!r}: {part.triangles} triangles, {_size(part.extent)} m at "
             f"{np.round(part.centre, 4).tolist()}, {surface}{guess}"
         )
-    return "\n".join(
-        [*lines, *([f"  and {len(ranked) - most} smaller ones"] if len(ranked) > most else [])]
-    )
+    if len(ranked) > most:
+        lines.append(f"  and {len(ranked) - most} smaller ones")
+    return "\n".join(lines)

@@ -1,5 +1,4 @@
-"""Reading GLB files as viewers show them: quantised, sparse and skinned surfaces, morphs at their
-weights, strips.
+"""Reading GLB files as viewers show them: quantised, sparse, skinned surfaces, morphs, strips.
 
 trimesh leaves normalised integers, skins and morphs out; pygltflib hands on the JSON and no arrays,
 pymeshlab's own reader ends the process on a skin. Source: Khronos, glTF 2.0 (sections 3.6, 3.7,
@@ -14,19 +13,27 @@ from pathlib import Path
 import numpy as np
 
 from lowalt.extensions.drafting.mesh_ply import stripped
+from lowalt.files.atomic import bytes_of
 from lowalt.files.errors import InputError
 from lowalt.files.json_objects import json_object
 from lowalt.numerics import portable
-from lowalt.targets.mesh_polygons import Piece
+from lowalt.targets.mesh_polygons import MOST_MESH_BYTES, Piece, refuse_many
 
 TYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
+TRIANGLES = 4
+TRIANGLE_STRIP = 5
+TRIANGLE_FAN = 6
+"""Modes of primitives that have faces. Source: glTF 2.0, section 5.24.4."""
 COMPRESSED = {
     "KHR_draco_mesh_compression": "Draco",
     "EXT_meshopt_compression": "meshopt",
     "KHR_meshopt_compression": "meshopt",
 }
-MOST_VALUES = 200_000_000
+OF_TRIANGLE = 6
+"""Numbers of a triangle: three corners, and half a vertex of three numbers."""
+OF_POSE = 200
+"""Numbers that take as long as the pose of a node or of an instance."""
 METRES = 1.0
 """Metres of the unit of the format. Source: glTF 2.0, section 3.4."""
 UP = "y"
@@ -34,8 +41,9 @@ UP = "y"
 
 
 class _Glb:
-    """A GLB file's JSON and its arrays; a damaged one raises KeyError, IndexError, TypeError or
-    ValueError.
+    """A GLB file's JSON and its arrays.
+
+    A damaged file raises KeyError, IndexError, TypeError or ValueError.
     """
 
     def __init__(self, data: bytes) -> None:
@@ -44,63 +52,82 @@ class _Glb:
             raise ValueError("expected a binary glTF of version 2")
         self.json = json_object(data[20 : 20 + size].decode(), "its JSON", "glTF")
         self.binary = data[28 + size :]
+        self.embedded: dict[int, bytes] = {}
+        self.size = len(data)
+        self.values = 0
+        self.count(OF_POSE * len(self.listed("nodes")))
 
-    def list(self, name: str) -> list:
+    def count(self, values: int) -> None:
+        """Count numbers before they are made, however often one surface is shown.
+
+        Raises: InputError for too many.
+        """
+        self.values += values
+        refuse_many(self.values // OF_TRIANGLE, self.size // OF_TRIANGLE)
+
+    def listed(self, name: str) -> list:
         """A list of the file's JSON, empty where it has none."""
         return self.json.get(name, [])
 
-    def _view(self, index: int, kind: str, width: int, count: int, offset: int) -> np.ndarray:
-        """`count` elements of `width` numbers of a buffer view, as they are stored."""
-        view = self.list("bufferViews")[_natural(index)]
-        data = self.binary
-        if uri := self.list("buffers")[_natural(view["buffer"])].get("uri"):
+    def _buffer(self, index: int) -> bytes:
+        """The bytes of a buffer: those behind the JSON, or those in it."""
+        uri = self.listed("buffers")[index].get("uri")
+        if not uri:
+            return self.binary
+        if index not in self.embedded:
             head, _, text = uri.partition(";base64,")
             if not head.startswith("data:"):
                 raise ValueError("its data lies in another file, expected all in one")
-            data = base64.b64decode(text)
+            self.embedded[index] = base64.b64decode(text)
+        return self.embedded[index]
+
+    def _view(self, index: int, kind: str, width: int, count: int, offset: int) -> np.ndarray:
+        """`count` elements of `width` numbers of a buffer view, as they are stored."""
+        view = self.listed("bufferViews")[_natural(index)]
+        data = self._buffer(_natural(view["buffer"]))
         start = _natural(view.get("byteOffset", 0))
         length = _natural(view["byteLength"])
         data = data[start : start + length]
         size = np.dtype(kind).itemsize
+        stride = view.get("byteStride") or size * width
         # NumPy refuses a shape that leaves the bytes of the view.
-        return np.ndarray(
-            (count, width), kind, data, offset, (view.get("byteStride") or size * width, size)
-        )
+        return np.ndarray((count, width), kind, data, offset, (stride, size))
 
     def array(self, index: int) -> np.ndarray:
         """An accessor's numbers (count, width); normalised integers become fractions."""
-        accessor = self.list("accessors")[_natural(index)]
+        accessor = self.listed("accessors")[_natural(index)]
         kind = TYPES[accessor["componentType"]]
         width = WIDTHS[accessor["type"]]
         count = _natural(accessor["count"])
-        if count * width > MOST_VALUES:
-            raise ValueError(f"an array of {count * width} numbers, expected at most {MOST_VALUES}")
+        self.count(count * width)
         if "bufferView" in accessor:
             offset = _natural(accessor.get("byteOffset", 0))
             values = self._view(accessor["bufferView"], kind, width, count, offset).copy()
         else:
             values = np.zeros((count, width), kind)
-        if sparse := accessor.get("sparse"):
-            at = sparse["indices"]
-            new = sparse["values"]
-            rows = self._view(
-                at["bufferView"],
-                TYPES[at["componentType"]],
-                1,
-                sparse["count"],
-                at.get("byteOffset", 0),
-            )
-            values[rows[:, 0]] = self._view(
-                new["bufferView"], kind, width, sparse["count"], new.get("byteOffset", 0)
-            )
+        if accessor.get("sparse"):
+            self._replace(values, accessor["sparse"], kind)
         if accessor.get("normalized") and kind != "<f4":
             return np.maximum(values / np.iinfo(kind).max, -1.0)
         return values
 
+    def _replace(self, values: np.ndarray, sparse: dict, kind: str) -> None:
+        """Write the values of a sparse accessor over those (count, width) of its buffer view."""
+        at = sparse["indices"]
+        new = sparse["values"]
+        count = sparse["count"]
+        self.count(_natural(count) * values.shape[1])
+        index_kind = TYPES[at["componentType"]]
+        rows = self._view(at["bufferView"], index_kind, 1, count, at.get("byteOffset", 0))
+        width = values.shape[1]
+        values[rows[:, 0]] = self._view(
+            new["bufferView"], kind, width, count, new.get("byteOffset", 0)
+        )
+
     def placed(self) -> dict[int, np.ndarray]:
         """The pose (4, 4) of each node of the scene shown, by its number."""
-        nodes = self.list("nodes")
-        scenes = self.list("scenes")
+        nodes = self.listed("nodes")
+        scenes = self.listed("scenes")
         if scenes:
             roots = scenes[_natural(self.json.get("scene", 0))].get("nodes", [])
         else:
@@ -134,56 +161,50 @@ class _Glb:
         return points
 
     def skinned(
-        self, points: np.ndarray, primitive: dict, skin: dict, places: dict[int, np.ndarray]
+        self, points: np.ndarray, primitive: dict, skin: dict, poses: dict[int, np.ndarray]
     ) -> np.ndarray:
-        """The vertices (V, 3) where the joints of a skin hold them; the place of the node itself
-        does not count.
+        """The vertices (V, 3) where the joints of a skin hold them.
+
+        The pose of the node itself does not count.
         """
         joints = skin["joints"]
+        self.count(16 * len(joints))
         attributes = primitive["attributes"]
         bind = np.tile(np.eye(4), (len(joints), 1, 1))
         if "inverseBindMatrices" in skin:
-            bind = (
-                self.array(skin["inverseBindMatrices"])
-                .reshape(-1, 4, 4)
-                .swapaxes(1, 2)
-                .astype(float)
-            )
+            by_column = self.array(skin["inverseBindMatrices"]).reshape(-1, 4, 4)
+            bind = by_column.swapaxes(1, 2).astype(float)
         moves = np.stack(
-            [portable.product(places[joint], bind[row]) for row, joint in enumerate(joints)]
+            [portable.product(poses[joint], bind[row]) for row, joint in enumerate(joints)]
         )
         result = np.zeros_like(points)
         total = np.zeros(len(points))
-        for group in range(sum(name.startswith("JOINTS_") for name in attributes)):
-            which, weights = (
-                self.array(attributes[f"{name}_{group}"]) for name in ("JOINTS", "WEIGHTS")
-            )
+        groups = sum(name.startswith("JOINTS_") for name in attributes)
+        for group in range(groups):
+            which = self.array(attributes[f"JOINTS_{group}"])
+            weights = self.array(attributes[f"WEIGHTS_{group}"])
             for column in range(which.shape[1]):
                 move = moves[which[:, column].astype(int)]
                 weight = weights[:, column].astype(float)
-                result += weight[:, None] * (
-                    portable.applied(move[:, :3, :3], points) + move[:, :3, 3]
-                )
+                moved = portable.applied(move[:, :3, :3], points) + move[:, :3, 3]
+                result += weight[:, None] * moved
                 total += weight
         return result / np.where(total > 0, total, 1.0)[:, None]
 
     def faces(self, primitive: dict, count: int) -> np.ndarray:
         """A primitive's triangles (F, 3); points and lines have none."""
-        order = (
-            self.array(primitive["indices"])[:, 0].astype(np.int64)
-            if "indices" in primitive
-            else np.arange(count)
-        )
-        mode = primitive.get("mode", 4)
-        if mode == 4:
+        order = np.arange(count)
+        if "indices" in primitive:
+            order = self.array(primitive["indices"])[:, 0].astype(np.int64)
+        mode = primitive.get("mode", TRIANGLES)
+        faces = np.zeros((0, 3), np.int64)
+        if mode == TRIANGLES:
             faces = order[: len(order) // 3 * 3].reshape(-1, 3)
-        elif mode == 5:
+        elif mode == TRIANGLE_STRIP:
             faces = stripped(order)
-        else:
-            order = order if mode == 6 and len(order) > 2 else order[:0]
-            faces = np.stack(
-                [np.repeat(order[:1], max(0, len(order) - 2)), order[1:-1], order[2:]], axis=1
-            )
+        elif mode == TRIANGLE_FAN and len(order) > 2:
+            hub = np.repeat(order[:1], len(order) - 2)
+            faces = np.stack([hub, order[1:-1], order[2:]], axis=1)
         if len(faces) and faces.max() >= count:
             raise ValueError(f"a triangle has vertex {faces.max()} of {count}")
         return faces
@@ -197,10 +218,10 @@ def _natural(value: object) -> int:
 
 
 def _local(node: dict) -> np.ndarray:
-    """A node's own place (4, 4): its matrix, or its translation, rotation and scale."""
+    """A node's own pose (4, 4): its matrix, or its translation, rotation and scale."""
     if "matrix" in node:
         return np.array(node["matrix"], float).reshape(4, 4).T
-    place = np.eye(4)
+    pose = np.eye(4)
     x, y, z, w = np.array(node.get("rotation", [0, 0, 0, 1]), float)
     turn = np.array(
         [
@@ -209,15 +230,15 @@ def _local(node: dict) -> np.ndarray:
             [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
         ]
     )
-    place[:3, :3] = turn * np.array(node.get("scale", [1, 1, 1]), float)
-    place[:3, 3] = node.get("translation", [0, 0, 0])
-    return place
+    pose[:3, :3] = turn * np.array(node.get("scale", [1, 1, 1]), float)
+    pose[:3, 3] = node.get("translation", [0, 0, 0])
+    return pose
 
 
 def _instances(glb: _Glb, node: dict) -> list[np.ndarray]:
-    """Return the place (4, 4) of each instance of a node's mesh in the node, one at its own place
-    where it names none.
+    """Return the pose (4, 4) of each instance of a node's mesh in the node.
 
+    A node without instances has one at its own pose.
     Source: glTF extension EXT_mesh_gpu_instancing.
     """
     attributes = node.get("extensions", {}).get("EXT_mesh_gpu_instancing", {}).get("attributes", {})
@@ -228,9 +249,9 @@ def _instances(glb: _Glb, node: dict) -> list[np.ndarray]:
     }
     if not columns:
         return [np.eye(4)]
-    return [
-        _local(dict(zip(columns, row, strict=True))) for row in zip(*columns.values(), strict=True)
-    ]
+    glb.count(OF_POSE * max(map(len, columns.values())))
+    rows = zip(*columns.values(), strict=True)
+    return [_local(dict(zip(columns, row, strict=True))) for row in rows]
 
 
 def pieces(path: Path) -> list[Piece]:
@@ -239,44 +260,51 @@ def pieces(path: Path) -> list[Piece]:
     Raises: InputError where the file is compressed, or its data lies elsewhere; other exceptions
     for a damaged file.
     """
-    glb = _Glb(path.read_bytes())
+    glb = _Glb(bytes_of(path, "mesh", MOST_MESH_BYTES))
     for name, word in COMPRESSED.items():
-        if name in glb.list("extensionsRequired"):
+        if name in glb.listed("extensionsRequired"):
             raise InputError(
                 f"{path}: is compressed by {word}, expected a plain GLB: export it without "
                 "compression"
             )
-    places = glb.placed()
+    poses = glb.placed()
     pieces = []
     taken = set()
-    for index, place in places.items():
-        node = glb.list("nodes")[index]
+    for index, pose in poses.items():
+        node = glb.listed("nodes")[index]
         if "mesh" not in node:
             continue
-        mesh = glb.list("meshes")[_natural(node["mesh"])]
+        mesh = glb.listed("meshes")[_natural(node["mesh"])]
         shape = str(mesh.get("name", f"mesh {node['mesh']}"))
         name = str(node.get("name", shape))
-        name = name if name not in taken else f"{name} {index}"
+        if name in taken:
+            name = f"{name} {index}"
         taken.add(name)
         for number, primitive in enumerate(mesh["primitives"]):
             if "POSITION" not in primitive["attributes"]:
                 continue
             points = glb.vertices(primitive, node, mesh.get("weights", []))
-            numbered = (f"{name} {number}",) if len(mesh["primitives"]) > 1 else ()
-            piece = Piece(points, glb.faces(primitive, len(points)), (*numbered, name, shape))
+            names = [name, shape]
+            if len(mesh["primitives"]) > 1:
+                names.insert(0, f"{name} {number}")
+            piece = Piece(points, glb.faces(primitive, len(points)), tuple(names))
             if "skin" in node and "JOINTS_0" in primitive["attributes"]:
-                skin = glb.list("skins")[_natural(node["skin"])]
-                pieces.append(replace(piece, vertices=glb.skinned(points, primitive, skin, places)))
+                skin = glb.listed("skins")[_natural(node["skin"])]
+                pieces.append(replace(piece, vertices=glb.skinned(points, primitive, skin, poses)))
                 continue
             instances = _instances(glb, node)
-            if len(instances) * max(piece.faces.size, piece.vertices.size) > MOST_VALUES:
-                raise ValueError(
-                    f"{len(instances)} instances of {len(piece.faces)} triangles, expected fewer"
-                )
-            for instance, within in enumerate(instances):
-                at = portable.product(place, within)
-                names = (f"{name} instance {instance}",) if len(instances) > 1 else ()
-                pieces.append(
-                    replace(piece.mapped(at[:3, :3]).moved(at[:3, 3]), names=(*names, *piece.names))
-                )
+            glb.count((len(instances) - 1) * (piece.faces.size + piece.vertices.size))
+            pieces += _placed(piece, name, pose, instances)
     return pieces
+
+
+def _placed(piece: Piece, name: str, pose: np.ndarray, instances: list[np.ndarray]) -> list[Piece]:
+    """A piece at each instance (4, 4) of a node at a pose (4, 4); name: the node's."""
+    result = []
+    for number, instance in enumerate(instances):
+        at = portable.product(pose, instance)
+        placed = piece.mapped(at[:3, :3]).moved(at[:3, 3])
+        if len(instances) > 1:
+            placed = replace(placed, names=(f"{name} instance {number}", *piece.names))
+        result.append(placed)
+    return result

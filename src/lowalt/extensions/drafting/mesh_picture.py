@@ -1,6 +1,4 @@
-"""A picture of a mesh as its file has it: three views along its axes, with what may be rotors,
-wheels or wings.
-"""
+"""A picture of a mesh as its file has it: three views, with what may be rotors or wheels."""
 
 import numpy as np
 from matplotlib import pyplot as plt
@@ -26,8 +24,9 @@ MOST_NUMBERS = 60
 
 
 def inspection_picture(inspection: Inspection, numbered: bool = False) -> bytes:
-    """Return a PNG of an inspected mesh, in metres along the file's axes, pieces that may move in
-    colours.
+    """Return a PNG of an inspected mesh, in metres along the file's axes.
+
+    Pieces that may move are in colours.
 
     numbered: whether the largest pieces have their numbers, from 1 in the order of the inspection.
     """

@@ -1,31 +1,30 @@
-"""Reading PLY files: polygons of any and of mixed sizes, and strips, in text and in both binary
-orders.
+"""Reading PLY files: polygons of any and mixed sizes, strips, as text and in binary orders.
 
 trimesh drops strips, and takes all faces of a binary file to be as long as its first (Blender
 writes mixed ones). Source: Greg Turk, The PLY Polygon File Format (1994).
 """
 
+import warnings
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
-from lowalt.targets.mesh_polygons import Piece, triangulated
+from lowalt.files.atomic import bytes_of
+from lowalt.targets.mesh_polygons import MOST_MESH_BYTES, Piece, triangulated
 
 
 def stripped(strip: np.ndarray) -> np.ndarray:
-    """Return the triangles (F, 3) of a strip of vertices; every second one is turned, -1 begins the
-    strip anew.
+    """Return the triangles (F, 3) of a strip of vertices; -1 begins the strip anew.
 
-    Source: glTF 2.0, section 3.7.2.1; the restart is PLY's.
+    Every second triangle is turned. Source: glTF 2.0, section 3.7.2.1; the restart is PLY's.
     """
     result = []
-    for part in np.split(strip, np.flatnonzero(strip < 0)):
-        part = part[part >= 0]
-        faces = (
-            np.stack([part[:-2], part[1:-1], part[2:]], axis=1)
-            if len(part) > 2
-            else np.zeros((0, 3), int)
-        )
+    for section in np.split(strip, np.flatnonzero(strip < 0)):
+        corners = section[section >= 0]
+        faces = np.zeros((0, 3), int)
+        if len(corners) > 2:
+            faces = np.stack([corners[:-2], corners[1:-1], corners[2:]], axis=1)
         faces[1::2] = faces[1::2, [1, 0, 2]]
         result.append(faces)
     faces = np.concatenate(result)
@@ -54,11 +53,13 @@ ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 
 
 class _Ply:
-    """A PLY file: `elements` (name, count, properties as words), and its data, read from the front."""
+    """A PLY file: `elements` (name, count, properties as words) and data, read from the front."""
 
     def __init__(self, data: bytes) -> None:
         end = data.index(b"end_header")
-        self.data, self.at, self.elements = data, data.index(b"\n", end) + 1, []
+        self.data = data
+        self.at = data.index(b"\n", end) + 1
+        self.elements: list[tuple[str, int, list[list[str]]]] = []
         lines = [line.split() for line in data[:end].decode("latin-1").splitlines()]
         kind = next((words[1] for words in lines if words[:1] == ["format"]), "")
         if not data.startswith(b"ply") or kind not in ORDERS:
@@ -72,16 +73,22 @@ class _Ply:
                 self.elements[-1][2].append(words[1:])
         self.order = ORDERS[kind]
         if not self.order:  # the numbers of a text, as if they were stored one by one
-            self.data = np.array(data[self.at :].split(), float).tobytes()
+            with warnings.catch_warnings():
+                warnings.simplefilter("error")  # NumPy only warns of a word that is no number
+                self.data = np.fromstring(data[self.at :], float, sep=" ").tobytes()
             self.at = 0
 
     def dtype(self, word: str) -> np.dtype:
         """The type of a number as it is stored."""
-        return np.dtype(self.order + TYPES[word]) if self.order else np.dtype("f8")
+        if not self.order:
+            return np.dtype("f8")
+        return np.dtype(self.order + TYPES[word])
 
     def take(self, dtype: np.dtype, count: int) -> np.ndarray:
         """The next `count` numbers or records. Raises: ValueError where the file ends before."""
-        values = np.frombuffer(self.data, dtype, count, self.at) if count else np.zeros(0, dtype)
+        if not count:
+            return np.zeros(0, dtype)
+        values = np.frombuffer(self.data, dtype, count, self.at)
         self.at += dtype.itemsize * count
         return values
 
@@ -94,9 +101,12 @@ class _Ply:
 
     def element(
         self, count: int, properties: list[list[str]]
-    ) -> dict[str, np.ndarray | list[np.ndarray]]:
-        """The values of an element's properties by name: at once where all lists of a property are
-        as long as its first one, else list by list."""
+    ) -> Mapping[str, np.ndarray | list[np.ndarray]]:
+        """The values of an element's properties by name.
+
+        They are read at once where all lists of a property are as long as its first one, otherwise
+        list by list.
+        """
         if not count or not properties:
             return {}
         start = self.at
@@ -113,14 +123,11 @@ class _Ply:
         rows = np.dtype(fields)
         if start + rows.itemsize * count <= len(self.data):
             table = self.take(rows, count)
-            if all(
-                (table[name] == table[name][0]).all()
-                for name in table.dtype.names
-                if name.startswith("size ")
-            ):
+            sizes = [table[name] for name in rows.fields or () if name.startswith("size ")]
+            if all((of_list == of_list[0]).all() for of_list in sizes):
                 return {words[-1]: table[words[-1]] for words in properties}
         self.at = start
-        values = {words[-1]: [] for words in properties}
+        values: dict[str, list[np.ndarray]] = {words[-1]: [] for words in properties}
         for _ in range(count):
             for words in properties:
                 size = self.size(words) if words[0] == "list" else 1
@@ -133,19 +140,16 @@ def pieces(path: Path) -> list[Piece]:
 
     Raises: exceptions of many types for a damaged file.
     """
-    ply = _Ply(path.read_bytes())
+    ply = _Ply(bytes_of(path, "mesh", MOST_MESH_BYTES))
     vertices = np.zeros((0, 3))
-    polygons = []
+    polygons: Sequence[np.ndarray] | np.ndarray = []
     faces = []
     for name, count, properties in ply.elements:
         values = ply.element(count, properties)
-        lists = next(
-            (values[word] for word in ("vertex_indices", "vertex_index") if word in values), []
-        )
+        lists = values.get("vertex_indices", values.get("vertex_index", []))
         if name == "vertex" and values:
-            vertices = np.stack(
-                [np.asarray(values[axis], float).reshape(-1) for axis in "xyz"], axis=1
-            )
+            columns = [np.asarray(values[axis], float).reshape(-1) for axis in "xyz"]
+            vertices = np.stack(columns, axis=1)
         elif name == "face":
             polygons = lists
         elif name.startswith("tristrip"):
@@ -153,8 +157,6 @@ def pieces(path: Path) -> list[Piece]:
     if len(polygons):
         counts = np.array([len(polygon) for polygon in polygons])
         faces.append(triangulated(vertices, counts, np.concatenate(polygons).astype(np.int64))[0])
-    return [
-        Piece(
-            vertices, np.concatenate(faces) if faces else np.zeros((0, 3), np.int64), (path.name,)
-        )
-    ]
+    if not faces:
+        faces.append(np.zeros((0, 3), np.int64))
+    return [Piece(vertices, np.concatenate(faces), (path.name,))]

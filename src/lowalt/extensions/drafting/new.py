@@ -1,5 +1,6 @@
-"""The draft of a record from a file and what the user states about it; a draft passes every check
-that `make` has.
+"""The draft of a record from a file and what the user states about it.
+
+A draft passes every check that `make` has.
 """
 
 import re
@@ -35,8 +36,7 @@ SEED = 20260701
 
 @dataclass(frozen=True)
 class Asked:
-    """What a user states: the file, the folder of inputs, the table of targets, and what is known
-    about the target.
+    """What a user states: the file, the folder of inputs, the table of targets, and known facts.
 
     `count` rotors or wheels; `moving` words such as 5+6 that number the pieces that move; `glb` the
     name of the file into which the parts of a description are written; `picture` where a picture
@@ -59,9 +59,12 @@ class Asked:
 
     @property
     def name(self) -> str:
-        """The name of the target: by default that of its file, or of the folder of a `model.sdf`."""
-        stem = self.file.stem if self.file.stem != "model" else self.file.resolve().parent.name
-        return self.subtype or stem
+        """The name of the target: by default of its file, or of the folder of a `model.sdf`."""
+        if self.subtype:
+            return self.subtype
+        if self.file.stem == "model":
+            return self.file.resolve().parent.name
+        return self.file.stem
 
     @property
     def row(self) -> dict:
@@ -78,9 +81,7 @@ class Draft:
 
 
 def _refuse(asked: Asked) -> None:
-    """Refuse a pedestrian, a name that is not published where no category is given, and a size that
-    is none.
-    """
+    """Refuse a pedestrian, an unpublished name without a category, and a size that is none."""
     if asked.row.get("category") == "Pedestrian":
         raise InputError(
             f"--subtype is {asked.name!r}, a pedestrian, expected a UAV, a bird or a vehicle"
@@ -90,11 +91,12 @@ def _refuse(asked: Asked) -> None:
     if not (asked.row or asked.category or is_description(asked.file)):
         if asked.subtype:
             raise InputError(
-                f"--subtype is {asked.subtype!r}, expected one of {list(asked.table)}, or --category for "
-                "a row of its own"
+                f"--subtype is {asked.subtype!r}, expected one of {list(asked.table)}, or "
+                "--category for a row of its own"
             )
         raise InputError(
-            f"{asked.file}: its category cannot be seen: {WHICH}; or --subtype with a published target"
+            f"{asked.file}: its category cannot be seen: {WHICH}; or --subtype with a published "
+            "target"
         )
 
 
@@ -111,10 +113,11 @@ def draft(asked: Asked, show: Callable[[Inspection], None]) -> Draft:
     inputs = asked.inputs.resolve()
     if not path.is_relative_to(inputs):
         raise InputError(
-            f"{asked.file}: not inside the folder of inputs {asked.inputs}, expected --inputs with it"
+            f"{asked.file}: not inside the folder of inputs {asked.inputs}, expected --inputs with "
+            "it"
         )
     if not is_description(asked.file):
-        category = asked.row.get("category") or asked.category
+        category = str(asked.row.get("category") or asked.category)
         text = _of_mesh(asked, asked.file, path.relative_to(inputs).as_posix(), category, show)
         _check(asked, text, asked.inputs)
         return Draft(text)
@@ -127,34 +130,37 @@ def draft(asked: Asked, show: Callable[[Inspection], None]) -> Draft:
 def _of_robot(asked: Asked, glb: Path, show: Callable[[Inspection], None]) -> str:
     """The record of a robot's description, whose parts are written into the file `glb`."""
     robot = read_robot(asked.file, asked.inputs)
+    axes = (asked.up, asked.front)
     try:
         category = asked.row.get("category") or asked.category or category_of(robot)
+        kind = MOVING_KIND[category]
         ahead = None
         if category == "Bird":
-            front = front_of_robot(robot, {}, category, (asked.up, asked.front)).axis
+            front = front_of_robot(robot, {}, category, axes).axis
             ahead = np.eye(3)["xyz".index(front[-1])]
-        joints, triangles = parts_of(robot, MOVING_KIND[category], ahead)
+        joints, triangles = parts_of(robot, kind, ahead)
         if joints:
             write_parts(glb, triangles)
-            count = asked.row.get("n_rotors_or_wings", len(joints))
-            kind = MOVING_KIND[category]
-            count = count if asked.count is None else asked.count
+            count = asked.count
+            if count is None:
+                count = asked.row.get("n_rotors_or_wings", len(joints))
             if kind != "wing" and count != len(joints):
                 raise InputError(
-                    f"{len(joints)} {kind}s turn, expected {count} for {asked.name}: leave --subtype and "
-                    "the number out for a row of its own, or choose a target with as many"
+                    f"{len(joints)} {kind}s turn, expected {count} for {asked.name}: leave "
+                    "--subtype and the number out for a row of its own, or choose a target with "
+                    "as many"
                 )
             names = (asked.name, asked.file.name, glb.name)
-            return drafted_robot(
-                robot, (joints, triangles), category, asked.table, names, (asked.up, asked.front)
-            )
+            return drafted_robot(robot, (joints, triangles), category, asked.table, names, axes)
     except InputError as error:
         raise InputError(f"{asked.file}: {error}") from None
     # The names of links tell rotors that no joint turns; their pieces are looked at like those of a
     # mesh.
-    write_parts(
-        glb, {link: np.concatenate(parts) for link, parts in robot.surfaces.items() if parts}
-    )
+    of_links = {}
+    for link, surfaces in robot.surfaces.items():
+        if surfaces:
+            of_links[link] = np.concatenate(surfaces)
+    write_parts(glb, of_links)
     return _of_mesh(replace(asked, unit="m", up=asked.up or "z"), glb, glb.name, category, show)
 
 
@@ -162,34 +168,31 @@ def _of_mesh(
     asked: Asked, path: Path, file: str, category: str, show: Callable[[Inspection], None]
 ) -> str:
     """The record of a mesh file at `path`, which the record names `file`."""
-    count = asked.row.get("n_rotors_or_wings") if asked.count is None else asked.count
+    count = asked.count
+    if count is None:
+        count = asked.row.get("n_rotors_or_wings")
+    row = asked.row | {"n_rotors_or_wings": count}
     axes = (asked.up, asked.front)
     usual = "x" if is_description(asked.file) else None
-    seen = inspect_mesh(
-        path,
-        category,
-        asked.unit,
-        asked.row | {"n_rotors_or_wings": count},
-        asked.size_m,
-        axes,
-        usual,
-    )
-    seen = replace(
-        seen, path=asked.file
-    )  # of a description, not the file that its parts lie in for now
+    seen = inspect_mesh(path, category, asked.unit, row, asked.size_m, axes, usual)
+    # Messages name the user's description, not the file that its parts lie in for now.
+    seen = replace(seen, path=asked.file)
     if not seen.sides_seen:
         raise InputError(
             f"{asked.file}: left and right of the bird cannot be seen, expected --up and --front"
         )
     if seen.cut:
         raise InputError(
-            f"{asked.file}: one half of a target, cut off along {seen.cut}: join it with its mirror "
-            f"image first, or give --front {seen.cut} where a whole one ends flat there"
+            f"{asked.file}: one half of a target, cut off along {seen.cut}: join it with its "
+            f"mirror image first, or give --front {seen.cut} where a whole one ends flat there"
         )
     if not asked.row:
         _refuse_size(asked, seen)
-    groups = chosen(seen, asked.moving) if asked.moving else seen.groups
-    count = len(groups) if asked.moving and count is None else count
+    groups = seen.groups
+    if asked.moving:
+        groups = chosen(seen, asked.moving)
+        if count is None:
+            count = len(groups)
     try:
         refuse_miscount(seen, groups, count, str(asked.picture))
     except InputError:
@@ -200,40 +203,47 @@ def _of_mesh(
 
 
 def _refuse_size(asked: Asked, seen: Inspection) -> None:
-    """Refuse a mesh of unusual size for its category. Raises: InputError naming the options and the
-    unit that fits.
+    """Refuse a mesh of unusual size for its category.
+
+    Raises: InputError naming the options and the unit that fits.
 
     A size from the user may be UNUSUAL, and one from the file may be twice as large as usual: a
     real helicopter is.
     """
-    extent, (low, high) = seen.high - seen.low, USUAL_M[seen.category]
-    given = asked.unit is not None or asked.size_m is not None
-    below = UNUSUAL if given else 1.0
-    above = 2.0 if seen.unit_from.startswith("stated") else below
+    extent = seen.high - seen.low
     size = float(extent.max())
-    if low / below <= size <= high * above:
+    low, high = USUAL_M[seen.category]
+    least = low
+    most = high
+    if asked.unit is not None or asked.size_m is not None:
+        least = low / UNUSUAL
+        most = high * UNUSUAL
+    if seen.unit_from.startswith("stated"):
+        most = high * 2.0
+    if least <= size <= most:
         return
     unit = guessed_unit(extent / metres(seen.unit), seen.category)
     fitting = size / metres(seen.unit) * UNITS_M[unit]
-    way = (
-        f", such as --unit {unit}, with which it measures {fitting:.4g} m"
-        if low <= fitting <= high
-        else ""
-    )
+    remedy = "give --unit or --size"
+    if low <= fitting <= high:
+        remedy += f", such as --unit {unit}, with which it measures {fitting:.4g} m"
     raise InputError(
-        f"{asked.file}: measures {size:.4g} m in the unit {seen.unit!r} ({seen.unit_from}), expected "
-        f"{low} to {high} m for a {seen.category}: give --unit or --size{way}"
+        f"{asked.file}: measures {size:.4g} m in the unit {seen.unit!r} ({seen.unit_from}), "
+        f"expected {low} to {high} m for a {seen.category}: {remedy}"
     )
 
 
 def _check(asked: Asked, text: str, folder: Path) -> None:
-    """Make the cloud of a drafted record, whose files are in the folder. Raises: InputError as
-    `make` does.
+    """Make the cloud of a drafted record, whose files are in the folder.
+
+    Raises: InputError as `make` does.
     """
     record = yaml.safe_load(text)[asked.name]
     cells = record.pop("row", None)
     try:
-        row = with_row(None, asked.name, cells, "draft") if cells else asked.row
+        row = asked.row
+        if cells:
+            row = with_row(None, asked.name, cells, "draft")
         make(merge(row, record, f"draft: {asked.name}"), folder, SEED)
     except InputError as error:
         reason = re.sub(f"^{re.escape(str(folder))}/|^{re.escape(asked.name)}: ", "", str(error))

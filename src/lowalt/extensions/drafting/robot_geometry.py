@@ -1,11 +1,9 @@
-"""What descriptions of robots share: links and joints, files inside the folder of inputs, surfaces,
-places, numbers.
-"""
+"""What descriptions of robots share: links, joints, files of inputs, surfaces, poses, numbers."""
 
 import math
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
@@ -18,8 +16,10 @@ from lowalt.files.errors import InputError, warn
 from lowalt.numerics import portable
 from lowalt.targets.mesh_collada import parsed, stated_metres
 from lowalt.targets.mesh_files import selected, suffixes
+from lowalt.targets.mesh_polygons import Piece, refuse_many
 
 LARGEST_BYTES = 16 << 20
+"""Largest size of a description with all that it includes."""
 MOST_FILES = 200
 MOST_SEARCHED = 100_000
 """Most files and folders below the folder of inputs that are searched for a package of another
@@ -37,8 +37,9 @@ MOST_TURN = 4 * math.pi
 
 @dataclass(frozen=True)
 class Joint:
-    """A joint that turns about its `hinge` (3,) m and `axis` (3,), `endless` or not; `parent` and
-    `child` are links.
+    """A joint that turns two links, `endless` or not, about its `hinge` (3,) m and `axis` (3,).
+
+    parent, child: the links.
     """
 
     name: str
@@ -51,17 +52,19 @@ class Joint:
 
 @dataclass
 class Robot:
-    """A description: `surfaces` by link, each a list of triangles (K, 3, 3) m; `fixed` pairs of
-    links, parent first, that do not turn; `joints` that do; `senses` of rotors by joint, seen
-    against the axis."""
+    """A description of a robot.
+
+    surfaces: by link, each a list of triangles (K, 3, 3) m; fixed: pairs of links, parent first,
+    that do not turn; joints: those that turn; senses: of rotors by joint, seen against the axis.
+    """
 
     surfaces: dict[str, list[np.ndarray]] = field(default_factory=dict)
     fixed: list[tuple[str, str]] = field(default_factory=list)
     joints: list[Joint] = field(default_factory=list)
     senses: dict[str, str] = field(default_factory=dict)
 
-    def below(self, link: str, others: set[str] = frozenset()) -> list[str]:
-        """Return a link and all links below it, without those in `others` and the links below them."""
+    def below(self, link: str, others: Collection[str] = ()) -> list[str]:
+        """Return a link and all links below it, except `others` and the links below them."""
         pairs = [*self.fixed, *((joint.parent, joint.child) for joint in self.joints)]
         links = [link]
         for name in links:
@@ -77,8 +80,9 @@ class Robot:
         axis: np.ndarray,
         limits: tuple[str | None, str | None],
     ) -> None:
-        """Add a joint that turns two links, parent first: without end where it has no limits (rad),
-        or wide ones.
+        """Add a joint that turns two links, parent first.
+
+        It turns without end where it has no limits (rad), or wide ones.
         """
         low, high = limits
         endless = not (low and high) or float(high) - float(low) > MOST_TURN
@@ -86,8 +90,9 @@ class Robot:
 
 
 def numbers(text: str | None, count: int, default: tuple[float, ...]) -> np.ndarray:
-    """Numbers of a text; a single one stands for all. Raises: ValueError where they are not `count`
-    finite ones.
+    """Numbers of a text; a single one stands for all.
+
+    Raises: ValueError where they are not `count` finite ones.
     """
     values = np.array(default, float)
     if text:
@@ -99,28 +104,31 @@ def numbers(text: str | None, count: int, default: tuple[float, ...]) -> np.ndar
     return values
 
 
-def place_of(shift: np.ndarray, turn: Rotation) -> np.ndarray:
-    """A place (4, 4) of a shift (3,) and a turn."""
-    place = np.eye(4)
-    place[:3, :3] = turn.as_matrix()
-    place[:3, 3] = shift
-    return place
+def pose_of(shift: np.ndarray, turn: Rotation) -> np.ndarray:
+    """A pose (4, 4) of a shift (3,) and a turn."""
+    pose = np.eye(4)
+    pose[:3, :3] = turn.as_matrix()
+    pose[:3, 3] = shift
+    return pose
 
 
 class Files:
-    """The files of a description inside the folder of inputs, and the surfaces that its geometry
-    names.
-    """
+    """The files of a description inside the folder of inputs, and the surfaces that they hold."""
 
     def __init__(self, inputs: Path) -> None:
         self.inputs = inputs.resolve()
         self.opened = 0
+        self.bytes_left = LARGEST_BYTES
+        self.triangles = 0
+        # Pieces of meshes by file and part: a description may name one mesh many times.
+        self.read: dict[tuple[Path, str | None], list[Piece]] = {}
         # The folders and name of every path below `inputs`, once they are needed.
         self.listed: list[tuple[str, ...]] | None = None
 
     def find(self, name: str, base: Path) -> Path:
-        """Return the file that a description in the folder `base` names: relative, package://,
-        model://.
+        """Return the file that a description in the folder `base` names.
+
+        The name is relative, package:// or model://.
         """
         scheme, slashes, location = name.strip().partition("://")
         if not slashes or scheme == "file":
@@ -142,17 +150,20 @@ class Files:
         for path in inside:
             if path.exists():
                 return path
-        if scheme in ("package", "model") and (path := self.elsewhere(name, location)):
-            return path
+        if scheme in ("package", "model"):
+            elsewhere = self.elsewhere(name, location)
+            if elsewhere is not None:
+                return elsewhere
         problem = "is not there" if inside else f"lies outside the folder of inputs {self.inputs}"
         raise InputError(
             f"{name!r} {problem}, expected it inside, by the name that the description has"
         )
 
     def elsewhere(self, name: str, location: str) -> Path | None:
-        """Return the one file or folder below the folder of inputs whose path ends as a package's
-        `location` does, with or without the package's own name: a clone often has another name.
-        Return None where there is none.
+        """Return the only path below the folder of inputs that ends as a package's `location` does.
+
+        The package's own name may be missing, since a clone often has another name. Return None
+        where no path ends so.
 
         Raises: InputError where several fit. Warns: InputWarning naming the file that is taken.
         """
@@ -186,14 +197,16 @@ class Files:
                 yield Path(folder, name)
 
     def parsed(self, path: Path) -> Element:
-        """Return the root of an XML file, bounded in size and count. Namespaces are dropped, except
-        that of xacro, and `$(optenv NAME DEFAULT)` becomes its default."""
+        """Return the root of an XML file, bounded in size and count.
+
+        Namespaces are dropped, except that of xacro, and `$(optenv NAME DEFAULT)` becomes its
+        default.
+        """
         self.opened += 1
-        if self.opened > MOST_FILES or path.stat().st_size > LARGEST_BYTES:
-            raise InputError(
-                f"{path}: expected at most {MOST_FILES} files of {LARGEST_BYTES >> 20} MiB"
-            )
-        root = parsed(path)
+        root = parsed(path, self.bytes_left)
+        self.bytes_left -= path.stat().st_size
+        if self.opened > MOST_FILES:
+            raise InputError(f"{path}: one file too many, expected at most {MOST_FILES}")
         for element in root.iter():
             if "xacro" not in element.tag:
                 element.tag = element.tag.rsplit("}", 1)[-1]
@@ -203,8 +216,9 @@ class Files:
         return root
 
     def mesh(self, name: str, base: Path, scale: np.ndarray, part: str | None = None) -> np.ndarray:
-        """Return the triangles (K, 3, 3) m of a mesh file, scaled; a COLLADA file's own unit
-        counts.
+        """Return the triangles (K, 3, 3) m of a mesh file, scaled.
+
+        A COLLADA file's own unit counts.
         """
         path = self.find(name, base)
         if path.suffix.lower() not in suffixes():
@@ -212,16 +226,38 @@ class Files:
         unit = 1.0
         if path.suffix.lower() == ".dae":
             unit = stated_metres(path) or 1.0
-        pieces = [piece.vertices[piece.faces] for piece in selected(path, part and [part])]
+        if (path, part) not in self.read:
+            self.read[path, part] = selected(path, [part] if part else None)
+        found = self.read[path, part]
+        refuse_many(self.triangles + sum(len(piece.faces) for piece in found), self._own())
+        pieces = [piece.vertices[piece.faces] for piece in found]
         if not pieces:
             raise InputError(f"{name!r} has no triangle, expected a surface")
         triangles = np.concatenate(pieces) * unit * scale
-        return triangles[:, ::-1] if np.prod(scale) < 0 else triangles
+        if np.prod(scale) < 0:
+            # A mirror image turns the surface inside out.
+            return triangles[:, ::-1]
+        return triangles
+
+    def _own(self) -> int:
+        """The triangles of the meshes read so far, each once."""
+        return sum(len(piece.faces) for pieces in self.read.values() for piece in pieces)
+
+    def shown(self, triangles: np.ndarray, place: np.ndarray) -> np.ndarray:
+        """Return triangles (K, 3, 3) at a place; those of the whole description are counted.
+
+        Raises: InputError where they are too many.
+        """
+        self.triangles += len(triangles)
+        refuse_many(self.triangles, self._own())
+        return shown(triangles, place)
 
 
 def primitive(kind: str, size: np.ndarray) -> np.ndarray:
-    """Triangles (K, 3, 3) of a box (edges), cylinder, capsule (radius, length along z), sphere or
-    ellipsoid (radii).
+    """Triangles (K, 3, 3) of a box, cylinder, capsule, sphere or ellipsoid.
+
+    size: the edges of a box, the radius and length along z of a cylinder or capsule, the radii of a
+    sphere or ellipsoid.
     """
     from trimesh import creation
 
@@ -237,9 +273,9 @@ def primitive(kind: str, size: np.ndarray) -> np.ndarray:
     return np.asarray(shape.triangles)
 
 
-def shown(triangles: np.ndarray, place: np.ndarray) -> np.ndarray:
-    """Triangles (K, 3, 3) at a place."""
-    return portable.applied(place[:3, :3], triangles) + place[:3, 3]
+def shown(triangles: np.ndarray, pose: np.ndarray) -> np.ndarray:
+    """Triangles (K, 3, 3) at a pose (4, 4)."""
+    return portable.applied(pose[:3, :3], triangles) + pose[:3, 3]
 
 
 def direction(axis: np.ndarray) -> np.ndarray:

@@ -14,11 +14,14 @@ from lowalt.extensions.drafting.robot_geometry import (
     Robot,
     direction,
     numbers,
-    place_of,
+    pose_of,
     primitive,
     shown,
 )
 from lowalt.numerics import portable
+
+LAST_SHOWN_GROUP = 2
+"""Viewers show geoms of the groups 0 to 2."""
 
 
 def _clear(values: dict[str, str]) -> bool:
@@ -43,21 +46,21 @@ class _Mjcf:
         for default in root.findall("default"):
             self.default(default, "main", {})
         folder = compiler.get("meshdir", compiler.get("assetdir", "."))
-        assets = [self.values(mesh, "") for mesh in root.findall("asset/mesh")]
-        self.meshes = {
-            values.get("name", Path(values["file"]).stem): (f"{folder}/{values['file']}", values)
-            for values in assets
-            if "file" in values
-        }
-        self.hidden = {
-            element.get("name")
-            for element in root.findall("asset/material")
-            if _clear(element.attrib)
-        }
+        self.meshes = {}
+        for mesh in root.findall("asset/mesh"):
+            values = self.values(mesh, "")
+            if "file" in values:
+                name = values.get("name", Path(values["file"]).stem)
+                self.meshes[name] = (f"{folder}/{values['file']}", values)
+        self.hidden = set()
+        for material in root.findall("asset/material"):
+            if _clear(material.attrib):
+                self.hidden.add(material.get("name"))
 
     def default(self, element: Element, name: str, above: dict) -> None:
         """Take the defaults of a class and of those inside it."""
-        self.defaults[name] = of_class = {tag: dict(values) for tag, values in above.items()}
+        of_class = {tag: dict(values) for tag, values in above.items()}
+        self.defaults[name] = of_class
         for child in element:
             if child.tag != "default":
                 of_class[child.tag] = of_class.get(child.tag, {}) | child.attrib
@@ -71,8 +74,8 @@ class _Mjcf:
         )
         return of_class.get(element.tag, {}) | element.attrib
 
-    def place(self, values: dict[str, str]) -> np.ndarray:
-        """The place (4, 4) of a body or geom."""
+    def pose(self, values: dict[str, str]) -> np.ndarray:
+        """The pose (4, 4) of a body or geom."""
         turn = Rotation.identity()
         if "quat" in values:
             turn = Rotation.from_quat(numbers(values["quat"], 4, ()), scalar_first=True)
@@ -91,17 +94,20 @@ class _Mjcf:
             x = direction(x)
             y = direction(y - x * portable.dot(x, y))
             turn = Rotation.from_matrix(np.stack([x, y, np.cross(x, y)], axis=1))
-        return place_of(numbers(values.get("pos"), 3, (0, 0, 0)), turn)
+        return pose_of(numbers(values.get("pos"), 3, (0, 0, 0)), turn)
 
     def geom(self, values: dict[str, str], above: np.ndarray) -> np.ndarray:
-        """Return the triangles (K, 3, 3) of a geom that viewers show: not transparent, no plane,
-        groups 0 to 2.
+        """Return the triangles (K, 3, 3) of a geom that viewers show.
+
+        Viewers show groups 0 to 2, and nothing transparent; planes have no triangles either.
         """
-        kind = values.get("type", "mesh" if "mesh" in values else "sphere")
+        usual = "mesh" if "mesh" in values else "sphere"
+        kind = values.get("type", usual)
         clear = _clear(values) or values.get("material") in self.hidden
-        if int(values.get("group", "0")) > 2 or clear or kind in ("plane", "hfield", "sdf"):
+        group = int(values.get("group", "0"))
+        if group > LAST_SHOWN_GROUP or clear or kind in ("plane", "hfield", "sdf"):
             return np.zeros((0, 3, 3))
-        place = self.place(values)
+        pose = self.pose(values)
         if kind == "mesh":
             if values.get("mesh") not in self.meshes:
                 raise ValueError(f"mesh {values.get('mesh')!r} is no asset")
@@ -111,14 +117,21 @@ class _Mjcf:
             size = np.array([float(word) for word in values.get("size", "").split()])
             if "fromto" in values:
                 ends = numbers(values["fromto"], 6, ()).reshape(2, 3)
-                size = np.array([size[0], portable.norm(ends[1] - ends[0]) / 2])
-                place = place_of(
-                    ends.mean(axis=0), Rotation.align_vectors([ends[1] - ends[0]], [[0, 0, 1]])[0]
-                )
-            # Lengths are halves here.
-            whole = {"box": 2 * size, "sphere": size[:1], "ellipsoid": size}
-            triangles = primitive(kind, whole[kind] if kind in whole else size * [1, 2])
-        return shown(triangles, portable.product(above, place))
+                along = ends[1] - ends[0]
+                size = np.array([size[0], portable.norm(along) / 2])
+                turn, _ = Rotation.align_vectors([along], [[0, 0, 1]])
+                pose = pose_of(ends.mean(axis=0), turn)
+            # Lengths are halves in MJCF.
+            if kind == "box":
+                whole = 2 * size
+            elif kind == "sphere":
+                whole = size[:1]
+            elif kind == "ellipsoid":
+                whole = size
+            else:
+                whole = size * [1, 2]
+            triangles = primitive(kind, whole)
+        return self.files.shown(triangles, portable.product(above, pose))
 
     def body(
         self, element: Element, parent: str, above: np.ndarray, childclass: str, depth: int
@@ -128,44 +141,50 @@ class _Mjcf:
             raise ValueError(f"bodies deeper than {DEEPEST}")
         name = element.get("name") or f"body {len(self.robot.surfaces)}"
         childclass = element.get("childclass", childclass)
-        here = portable.product(above, self.place(element.attrib))
-        geoms = [self.values(geom, childclass) for geom in element.findall("geom")]
+        here = portable.product(above, self.pose(element.attrib))
         self.robot.surfaces[name] = []
-        for values in geoms:
-            part = values.get("name", "")
-            owner = part if TURNING["rotor"].search(part) or TURNING["wheel"].search(part) else name
+        for geom in element.findall("geom"):
+            values = self.values(geom, childclass)
+            own_name = values.get("name", "")
+            owner = name
+            if TURNING["rotor"].search(own_name) or TURNING["wheel"].search(own_name):
+                # A geom that its name calls a rotor or a wheel is a link, fixed to its body.
+                owner = own_name
             self.robot.surfaces.setdefault(owner, []).append(self.geom(values, here))
-            if (
-                owner != name
-                # a geom that its name calls a rotor or a wheel is a link of its own, fixed to its body
-            ):
+            if owner != name:
                 self.robot.fixed.append((name, owner))
-        joints = (
-            [self.values(joint, childclass) for joint in element.findall("joint")] if parent else []
-        )
-        hinges = [values for values in joints if values.get("type", "hinge") == "hinge"]
-        for values in hinges[-1:]:
-            hinge = numbers(values.get("pos"), 3, (0, 0, 0))
-            axis = numbers(values.get("axis"), 3, (0, 0, 1))
-            limited = "range" in values and values.get("limited") != "false"
-            low, high = values["range"].split() if limited else (None, None)
-            if low and self.degrees:
-                low, high = (str(math.radians(float(end))) for end in (low, high))
-            hinge = shown(hinge, here)
-            axis = portable.applied(here[:3, :3], axis)
-            self.robot.turns(values.get("name", name), (parent, name), hinge, axis, (low, high))
-        if parent and not hinges:
-            self.robot.fixed.append((parent, name))
+        if parent:
+            self.joint(element, parent, name, here, childclass)
         for child in element.findall("body"):
             self.body(child, name, here, childclass, depth + 1)
 
+    def joint(
+        self, element: Element, parent: str, name: str, here: np.ndarray, childclass: str
+    ) -> None:
+        """Take the last hinge of a body, or fix the body to its parent; here: its pose (4, 4)."""
+        joints = [self.values(joint, childclass) for joint in element.findall("joint")]
+        hinges = [values for values in joints if values.get("type", "hinge") == "hinge"]
+        if not hinges:
+            self.robot.fixed.append((parent, name))
+            return
+        values = hinges[-1]
+        limits: tuple[str | None, str | None] = (None, None)
+        if "range" in values and values.get("limited") != "false":
+            low, high = values["range"].split()
+            if self.degrees:
+                low = str(math.radians(float(low)))
+                high = str(math.radians(float(high)))
+            limits = (low, high)
+        hinge = shown(numbers(values.get("pos"), 3, (0, 0, 0)), here)
+        axis = portable.applied(here[:3, :3], numbers(values.get("axis"), 3, (0, 0, 1)))
+        self.robot.turns(values.get("name", name), (parent, name), hinge, axis, limits)
+
 
 def mjcf(root: Element, base: Path, files: Files) -> Robot:
-    """Return the robot of an MJCF file in the folder `base`; the world's own geoms (floors) are
-    left.
+    """Return the robot of an MJCF file in the folder `base`.
 
-    Raises: InputError for files that are missing or outside; other exceptions for a damaged
-    description.
+    The world's own geoms, such as floors, are left out. Raises: InputError for files that are
+    missing or outside; other exceptions for a damaged description.
     """
     for include in root.findall("include"):
         root.extend(files.parsed(files.find(include.get("file", ""), base)))

@@ -1,5 +1,4 @@
-"""From a robot's own description to a drafted record: the parts that turn are chosen and written
-into one GLB.
+"""From a robot's own description to a drafted record, its turning parts in one GLB file.
 
 `robot_files` reads URDF, SDF and MJCF. All three are in metres with z up and, by convention, x to
 the front.
@@ -35,9 +34,7 @@ def _names(joint: Joint) -> tuple[str, str]:
 
 
 def _steers(joint: Joint) -> bool:
-    """Return whether a joint turns a steering wheel, which is no wheel that rolls: its axle is not
-    level.
-    """
+    """Return whether a joint turns a steering wheel, whose axle is not level."""
     names = " ".join(_names(joint))
     if STEERING_WHEEL.search(names):
         return True
@@ -52,8 +49,10 @@ def _called(joint: Joint, kind: str) -> bool:
 
 
 def turning(robot: Robot, kind: str, ahead: np.ndarray | None = None) -> list[Joint]:
-    """Return the joints of a robot whose links are parts of a kind: those that its names call so,
-    else those called motors, else all that turn without end and are called nothing else.
+    """Return the joints of a robot whose links are parts of a kind.
+
+    These are the joints that names call so, else those called motors, else all that turn without
+    end and are called nothing else.
 
     ahead: (3,) where the front is known; wings beat about it, and joints that sweep or twist them
     are held.
@@ -77,14 +76,17 @@ def turning(robot: Robot, kind: str, ahead: np.ndarray | None = None) -> list[Jo
 
 
 def category_of(robot: Robot) -> str:
-    """Return "UAV" where parts called rotors turn, "Vehicle" where wheels do; where none turns, the
-    links' names tell.
+    """Return "UAV" where parts called rotors turn, "Vehicle" where wheels do.
+
+    Where none turns, the links' names tell.
 
     Raises: InputError where both or neither are there.
     """
     kinds = ("rotor", "wheel")
     turning_joints = [joint for joint in robot.joints if joint.endless and not _steers(joint)]
-    called = {kind: sum(_called(joint, kind) for joint in turning_joints) for kind in kinds}
+    called = {}
+    for kind in kinds:
+        called[kind] = sum(_called(joint, kind) for joint in turning_joints)
     # A plane may have one wheel beside a motor; a vehicle has at least two, or nothing else that
     # turns.
     least = {"rotor": 1, "wheel": min(2, len(turning_joints))}
@@ -92,8 +94,10 @@ def category_of(robot: Robot) -> str:
     if not any(called.values()):
         links = robot.surfaces
         named = [kind for kind in kinds if any(map(TURNING[kind].search, links))]
-    if len(named) == 1:
-        return "UAV" if named == ["rotor"] else "Vehicle"
+    if named == ["rotor"]:
+        return "UAV"
+    if named == ["wheel"]:
+        return "Vehicle"
     seen = "both rotors and wheels" if named else "neither rotors nor wheels"
     raise InputError(f"its category cannot be seen, the names of its parts tell {seen}: {WHICH}")
 
@@ -101,15 +105,16 @@ def category_of(robot: Robot) -> str:
 def parts_of(
     robot: Robot, kind: str, ahead: np.ndarray | None = None
 ) -> tuple[dict[str, Joint], dict[str, np.ndarray]]:
-    """Return the joints of the parts of a kind by name, and the triangles (K, 3, 3) m of "body" and
-    of each part.
+    """Return the joints of the parts of a kind by name, and the triangles of each part.
+
+    The triangles (K, 3, 3) m are also those of "body".
 
     ahead: (3,) the direction to the front, of which wings need to know.
     Raises: InputError where nothing is left for the body.
     """
-    joints = {}
-    taken = {}
-    triangles = {}
+    joints: dict[str, Joint] = {}
+    taken: dict[str, str] = {}
+    triangles: dict[str, list[np.ndarray]] = {}
     chosen = turning(robot, kind, ahead)
     ends = {joint.child for joint in chosen}
     for joint in chosen:
@@ -165,8 +170,9 @@ def _rounded(vector: np.ndarray) -> list[float]:
 def part_lines(
     robot: Robot, joints: dict[str, Joint], kind: str, file: str, hubs: np.ndarray, up: np.ndarray
 ) -> list[str]:
-    """Return the lines of a record's parts: a body, and each part with its hinge, axis and (of a
-    rotor) sense.
+    """Return the lines of a record's parts: a body, and each part with hinge, axis and sense.
+
+    Only rotors have a sense.
 
     hubs: (R, 2) m, the hinges in plan; up: (3,) the direction up in the file.
     """
@@ -185,8 +191,10 @@ def part_lines(
             turn = f", sense: {known or sense}"
             if not known:
                 mark = "  # GUESSED sense: neighbours turn in turn"
-        elif kind == "wing" and (above := _above(robot, joint, joints)):
-            turn = f", parent: {above!r}"
+        elif kind == "wing":
+            above = _above(robot, joint, joints)
+            if above:
+                turn = f", parent: {above!r}"
         meshes = f"meshes: [{{file: {file!r}, geometry: [{name!r}]}}]"
         lines.append(
             f"    {name!r}: {{kind: {kind}, {meshes}, hinge: {hinge}, axis: {axis}{turn}}}{mark}"
@@ -231,7 +239,9 @@ def front_of_robot(
     Raises: InputError as `front_of`.
     """
     up = axes[0] or "z"
-    upward = np.eye(3)["xyz".index(up[-1])] * (-1 if up[0] == "-" else 1)
+    upward = np.eye(3)["xyz".index(up[-1])]
+    if up[0] == "-":
+        upward = -upward
     usual = None if up[-1] == "x" else "x"
     return front_of(shape_of(robot, joints, category, upward), axes[1], usual, "y")
 

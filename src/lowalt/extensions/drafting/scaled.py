@@ -1,9 +1,11 @@
-"""A record drafted from a data sheet: the figures it states, and all others scaled from the
-published target of the same frame that is nearest in size."""
+"""A record drafted from a data sheet: its figures, and others scaled from a published target.
+
+That target has the same frame and is nearest in size.
+"""
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import yaml
@@ -42,8 +44,11 @@ of blades nearest in size."""
 
 
 class Kind(NamedTuple):
-    """A kind of data sheet: its category and usual frame, and of each word of the sheet the cells
-    of the table of targets, or the figure of the frame, that it states."""
+    """A kind of data sheet.
+
+    category, frame: its category and usual frame; cells, figures: of each word of the sheet the
+    cells of the table of targets, or the figure of the frame, that it states.
+    """
 
     category: str
     frame: str
@@ -76,8 +81,11 @@ KINDS = {
 
 
 class Sheet(NamedTuple):
-    """What a data sheet states: `row`, cells of the table of targets, and `figures` of the frame in
-    metres or as counts; `about` says which sheet it is."""
+    """What a data sheet states.
+
+    row: cells of the table of targets; figures: of the frame, in metres or as counts; about: which
+    sheet it is.
+    """
 
     category: str
     frame: str
@@ -88,25 +96,28 @@ class Sheet(NamedTuple):
 
 def frames(category: str) -> list[str]:
     """Return the frames (built-in models) of a category that a data sheet can be drafted with."""
-    known = schema()["models"].items()
-    return [
-        name
-        for name, model in known
-        if model["like"] == category and SIZE_IS[category] in model["size_is"]
-    ]
+    names = []
+    for name, model in schema()["models"].items():
+        if model["like"] == category and SIZE_IS[category] in model["size_is"]:
+            names.append(name)
+    return names
 
 
 def _nearest(sheet: Sheet, model: str) -> tuple[dict, dict]:
-    """The record and the row of the published target of a built-in model that is nearest in size."""
+    """The record and the row of the published target of a model that is nearest in size."""
     table = load_table(SHIPPED / "config/targets.csv")
     key = "len_m" if sheet.category == "Vehicle" else "size_m"
     found = []
     for file in FILES:
         for name, record in read_records(SHIPPED / f"config/targets/{file}.yaml").items():
-            if record.get("model") == model:
-                row = table[name] if name in table else with_row(None, name, record["row"], file)
-                found.append((abs(np.log(row[key] / sheet.row[key])), len(found), record, row))
-    return min(found)[2:]
+            if record.get("model") != model:
+                continue
+            row = table.get(name)
+            if row is None:
+                row = with_row(None, name, record["row"], file)
+            found.append((abs(np.log(row[key] / sheet.row[key])), record, row))
+    _, record, row = min(found, key=lambda candidate: candidate[0])
+    return record, row
 
 
 def _lender(sheet: Sheet) -> tuple[dict, dict]:
@@ -127,10 +138,12 @@ def _figures(sheet: Sheet, record: dict, lent: dict) -> dict[str, list]:
     result = {}
     for name, kind in kinds.items():
         value, unit, _ = record["figures"][name]
-        side = BY_SIDE.get(name, "len_m") if sheet.category == "Vehicle" else "size_m"
         if name in sheet.figures:
             result[name] = [sheet.figures[name], "m" if kind == "length" else 1, SHEET]
         elif kind == "length":
+            side = "size_m"
+            if sheet.category == "Vehicle":
+                side = BY_SIDE.get(name, "len_m")
             grown = value * UNITS[str(unit)] * sheet.row[side] / lent[side]
             result[name] = [float(f"{grown:.3g}"), "m", "estimate"]
         else:
@@ -139,11 +152,10 @@ def _figures(sheet: Sheet, record: dict, lent: dict) -> dict[str, list]:
 
 
 def drafted_sheet(sheet: Sheet, subtype: str) -> tuple[str, str]:
-    """Return a record file's text for a subtype with a row of its own, and the name of the
-    published target that lends what the sheet does not state.
+    """Return a record file's text for a subtype with a row of its own, and the lender's name.
 
-    Raises: InputError for a frame that does not exist, naming those that do, and for figures that
-    fit no such target.
+    The lender is the published target that lends what the sheet does not state. Raises: InputError
+    for a frame that does not exist, naming those that do, and for figures that fit no such target.
     """
     known = frames(sheet.category)
     if sheet.frame not in known:
@@ -153,7 +165,8 @@ def drafted_sheet(sheet: Sheet, subtype: str) -> tuple[str, str]:
         rotors = sheet.row["n_rotors_or_wings"]
         if rotors % 2:
             raise InputError(
-                f"rotors is {rotors}, expected an even number with the frame {COAXIAL}, two on each arm"
+                f"rotors is {rotors}, expected an even number with the frame {COAXIAL}, two on "
+                "each arm"
             )
         # The row counts motor axes, as it does for every craft with two layers of blades.
         sheet = sheet._replace(row={**sheet.row, "n_rotors_or_wings": rotors // 2})
@@ -165,28 +178,27 @@ def drafted_sheet(sheet: Sheet, subtype: str) -> tuple[str, str]:
     }
     cells |= {"category": sheet.category, "unseen_protocol": "seen", **stated}
     body = {
-        "row": cells,
         "row_from": dict.fromkeys(stated, sheet.about),
         "source": "builtin",
         "model": sheet.frame,
         "size_is": SIZE_IS[sheet.category],
         **{key: record[key] for key in KEPT if key in record},
-        **({"wheel_size": "rolling"} if sheet.category == "Vehicle" else {}),
-        "sources": {SHEET: sheet.about},
-        "figures": _figures(sheet, record, lent),
     }
-    merge(
-        with_row(None, subtype, cells, "data sheet"),
-        {key: body[key] for key in body if key != "row"},
-        "data sheet",
-    )
+    if sheet.category == "Vehicle":
+        body["wheel_size"] = "rolling"
+    body["sources"] = {SHEET: sheet.about}
+    body["figures"] = _figures(sheet, record, lent)
+    # Refuse figures that fit no such target.
+    merge(with_row(None, subtype, cells, "data sheet"), body, "data sheet")
+    body = {"row": cells, **body}
     lines = yaml.safe_dump(
         {subtype: body}, sort_keys=False, allow_unicode=True, default_flow_style=None, width=400
     )
     lender = lent["name"]
     head = (
-        f"# Drafted from a data sheet: figures of the source `{SHEET}` are the sheet's, estimates are those of\n"
-        f"# {lender}, scaled to this size; cells of the row that row_from does not name are {lender}'s.\n"
+        f"# Drafted from a data sheet: figures of the source `{SHEET}` are the sheet's, estimates "
+        f"are those of\n# {lender}, scaled to this size; cells of the row that row_from does not "
+        f"name are {lender}'s.\n"
     )
     return head + lines, lender
 
@@ -200,9 +212,10 @@ def draft_target(
     about: str = "data sheet",
     **stated: float | tuple[float, float] | None,
 ) -> tuple[str, str]:
-    """Return the record of a target drafted from its data sheet, as the text of a YAML file, and
-    the name of the published target whose figures were scaled for what the sheet does not state.
+    """Return the record of a target drafted from its data sheet, and the lender's name.
 
+    The record is the text of a YAML file; the lender is the published target whose figures were
+    scaled for what the sheet does not state.
     kind: "drone", "bird" or "vehicle"; out: new file to write the text to, for `targets.own` of a
     configuration;
     subtype: its name (default: that of the file); frame: built-in model (default: that of `KINDS`);
@@ -217,28 +230,27 @@ def draft_target(
     if kind not in KINDS:
         raise InputError(f"{kind!r} is no kind of data sheet, expected one of {list(KINDS)}")
     category, usual, cells, figures = KINDS[kind]
-    if {*cells, *figures} - {"climb"} != set(stated) - {"climb"} or not set(stated) <= {
-        *cells,
-        *figures,
-    }:
-        raise InputError(
-            f"data sheet of a {kind}: it states {[*stated]}, expected {sorted({*cells, *figures})}"
-        )
+    known = {*cells, *figures}
+    needed = known - {"climb"}
+    if not needed <= set(stated) <= known:
+        raise InputError(f"data sheet of a {kind}: it states {[*stated]}, expected {sorted(known)}")
     row: dict = {}
     for word, names in cells.items():
-        values = np.ravel(stated.get(word)).tolist()
+        values: list = np.ravel(np.array(stated.get(word))).tolist()
         if len(values) not in (1, len(names)):
             raise InputError(
                 f"data sheet of a {kind}: {word} is {stated[word]}, expected {len(names)} numbers"
             )
-        row |= dict(zip(names, values * (len(names) if len(values) == 1 else 1), strict=True))
-    path = None if out is None else Path(out)
-    sheet = Sheet(
-        category, frame or usual, row, {figures[word]: stated[word] for word in figures}, about
-    )
-    text, lender = drafted_sheet(sheet, subtype or (path.stem if path else f"My {kind}"))
-    if path:
-        if path.exists():
-            raise InputError(f"{path}: is there already, expected a new file")
-        write_file(path, text)
+        if len(values) == 1:
+            values *= len(names)
+        row |= dict(zip(names, values, strict=True))
+    of_frame: dict[str, Any] = {figures[word]: stated[word] for word in figures}
+    sheet = Sheet(category, frame or usual, row, of_frame, about)
+    if out is None:
+        return drafted_sheet(sheet, subtype or f"My {kind}")
+    path = Path(out)
+    text, lender = drafted_sheet(sheet, subtype or path.stem)
+    if path.exists():
+        raise InputError(f"{path}: is there already, expected a new file")
+    write_file(path, text)
     return text, lender

@@ -27,8 +27,9 @@ INNER = ("points", "owner", "groups", "sides_seen")
 
 
 def _unit(text: str) -> str | float:
-    """Unit of a command line: a name of UNITS_M, or metres. Raises: ArgumentTypeError for other
-    text.
+    """Unit of a command line: a name of UNITS_M, or metres.
+
+    Raises: ArgumentTypeError for other text.
     """
     if text in UNITS_M:
         return text
@@ -60,7 +61,10 @@ def add_to(commands: argparse._SubParsersAction, name: str) -> None:
         help="picture to write (default: the file's name and -inspect.png, here)",
     )
     meaning = "draft a record of a mesh or a robot's description; figures to confirm are marked"
-    example = 'lowalt target new inputs/mydrone.stl --subtype "DJI Mini 2" --inputs inputs --out mine.yaml'
+    example = (
+        'lowalt target new inputs/mydrone.stl --subtype "DJI Mini 2" --inputs inputs '
+        "--out mine.yaml"
+    )
     new = add_command(actions, "new", _new, meaning, example)
     new.add_argument(
         "--subtype",
@@ -148,18 +152,17 @@ def _inspect(options: argparse.Namespace) -> Answer:
         )
     seen = inspect_mesh(options.file, category, options.unit, row, options.size_m)
     out = _write(options.out or Path(f"{options.file.stem}-inspect.png"), inspection_picture(seen))
-    facts = {name: value for name, value in vars(seen).items() if name not in INNER} | {
-        "components": [
-            vars(part) | {"extent": part.extent, "centre": part.centre} for part in seen.components
-        ],
-        "pieces": [
-            {"name": name, "triangles": count, "extent": extent}
-            for name, count, extent in seen.pieces
-        ],
-        **({"wings_from_m": seen.shoulder_m} if seen.category == "Bird" else {}),
-        "picture": out,
-        "front_from": seen.front_from.words,
-    }
+    facts = {name: value for name, value in vars(seen).items() if name not in INNER}
+    facts["components"] = [
+        vars(part) | {"extent": part.extent, "centre": part.centre} for part in seen.components
+    ]
+    facts["pieces"] = [
+        {"name": name, "triangles": count, "extent": extent} for name, count, extent in seen.pieces
+    ]
+    if seen.category == "Bird":
+        facts["wings_from_m"] = seen.shoulder_m
+    facts["picture"] = out
+    facts["front_from"] = seen.front_from.words
     return Answer(facts, f"{described(seen)}\n\npicture  {out}")
 
 
@@ -189,8 +192,11 @@ def _new(options: argparse.Namespace) -> Answer:
         _write(asked.picture, inspection_picture(seen, numbered=True))
 
     made = draft(asked, show)
-    files = {options.out: made.text.encode(), options.inputs / asked.glb: made.glb}
-    files = {path: data for path, data in files.items() if path is not None and data is not None}
+    files: dict[Path, bytes] = {}
+    if options.out is not None:
+        files[options.out] = made.text.encode()
+    if made.glb is not None:
+        files[options.inputs / asked.glb] = made.glb
     for path in files:
         if path.exists():
             raise InputError(f"{path}: is there already, expected a new file")
@@ -201,13 +207,9 @@ def _new(options: argparse.Namespace) -> Answer:
     facts = {"file": options.out, "text": made.text, "moving_parts": moving, "marked_lines": marks}
     if options.out is None:
         return Answer(facts, made.text)
-    ask = (
-        re.search(r"  front: .*GUESSED", made.text)
-        and "; which way is front is not sure: confirm it or give --front"
-    )
-    said = (
-        f"{options.out}: {moving} moving parts drafted; confirm the {marks} marked lines{ask or ''}"
-    )
+    said = f"{options.out}: {moving} moving parts drafted; confirm the {marks} marked lines"
+    if re.search(r"  front: .*GUESSED", made.text):
+        said += "; which way is front is not sure: confirm it or give --front"
     return Answer(facts, said)
 
 
@@ -216,7 +218,9 @@ def _make(options: argparse.Namespace) -> Answer:
     from lowalt.targets.make import make
 
     records = read_records(options.record)
-    subtype = options.subtype or (next(iter(records)) if len(records) == 1 else None)
+    subtype = options.subtype
+    if not subtype and len(records) == 1:
+        (subtype,) = records
     if subtype not in records:
         raise InputError(
             f"{options.record}: --subtype is {subtype!r}, expected one of {list(records)}"
@@ -228,7 +232,8 @@ def _make(options: argparse.Namespace) -> Answer:
         row = with_row(row, subtype, record.pop("row"), where)
     if row is None:
         raise InputError(
-            f"{where}: no row in {options.table}, expected a key `row` or the name of a published subtype"
+            f"{where}: no row in {options.table}, expected a key `row` or the name of a published "
+            "subtype"
         )
     record = merge(row, record, where)
     cloud = make(record, options.inputs, options.seed)
@@ -237,8 +242,9 @@ def _make(options: argparse.Namespace) -> Answer:
     picture = _picture(out, out.with_suffix(".png"))
     guessed, figures = estimates(cloud.record)
     facts = {"file": out, "points": len(cloud.points), "parts": cloud.kinds, "picture": picture}
-    words = f"; {guessed} of its {figures} figures are estimates" if guessed else ""
-    said = f"{out}: {len(cloud.points)} points in {len(cloud.kinds)} parts; {picture}{words}"
+    said = f"{out}: {len(cloud.points)} points in {len(cloud.kinds)} parts; {picture}"
+    if guessed:
+        said += f"; {guessed} of its {figures} figures are estimates"
     return Answer({**facts, "estimates": guessed, "figures": figures}, said)
 
 

@@ -1,1 +1,1 @@
-"""Files for other tools: SigMF recordings of signals (`python -m lowalt.extensions.formats.sigmf`)."""
+"""Files for other tools: ONNX, SigMF, data sets on web servers, and the zoo of small models."""

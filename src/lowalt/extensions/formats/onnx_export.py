@@ -11,8 +11,9 @@ from lowalt.recognition.runs import Trained
 
 
 class Probabilities(nn.Module):
-    """The network with its softmax: index images (B, views, size, size) uint8 -> probabilities (B,
-    classes).
+    """The network with its softmax.
+
+    Index images (B, views, size, size) uint8 -> probabilities (B, classes).
     """
 
     def __init__(self, model: nn.Module) -> None:
@@ -48,5 +49,6 @@ def export(trained: Trained, out: str | Path) -> None:
             )
         except ImportError as error:
             raise InputError(
-                f"--out {out}: ONNX needs onnx and onnxscript ({error}), expected `{install_command('export')}`"
+                f"--out {out}: ONNX needs onnx and onnxscript ({error}), expected "
+                f"`{install_command('export')}`"
             ) from error

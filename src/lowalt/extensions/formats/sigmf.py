@@ -1,5 +1,6 @@
-"""Signals as SigMF recordings: one per station, all samples one after the other, each with an
-annotation of its own.
+"""Signals as SigMF recordings: one per station, an annotation for each sample.
+
+The samples stand one after the other.
 
 `python -m lowalt.extensions.formats.sigmf --index INDEX --out FOLDER`. The sample rate is the
 symbol
@@ -29,30 +30,27 @@ KEPT = ("key", "category", "subtype", "group", "model", "fold", "snr_db", "noise
 """Fields of a sample's record that go into its annotation."""
 
 
-def metadata(shards: ShardSet, network: Network, place: int, digest: str) -> dict:
+def metadata(shards: ShardSet, network: Network, number: int, digest: str) -> dict:
     """Return the SigMF metadata of one station's recording of all samples.
 
-    place: the station's number in the network; digest: SHA-512 of the data file in hexadecimal.
+    number: the station's number in the network; digest: SHA-512 of the data file in hexadecimal.
     """
-    station = network.stations[place]
+    station = network.stations[number]
     annotations = []
-    for number in range(len(shards)):
-        entry = shards.record(number)
-        annotations.append(
-            {
-                "core:sample_start": number * network.symbols,
-                "core:sample_count": network.symbols,
-                "core:label": entry["category"],
-                "core:comment": f"{entry['subtype']}, motion model {entry['model']}",
-                # JSON has no infinity: without noise the annotation names no SNR.
-                **{
-                    f"lowalt:{name}": entry[name]
-                    for name in KEPT
-                    if name != "snr_db" or entry["noise"]
-                },
-                "lowalt:geometry": entry["geometry"][station.name],
-            }
-        )
+    for sample in range(len(shards)):
+        entry = shards.record(sample)
+        annotation = {
+            "core:sample_start": sample * network.symbols,
+            "core:sample_count": network.symbols,
+            "core:label": entry["category"],
+            "core:comment": f"{entry['subtype']}, motion model {entry['model']}",
+        }
+        for name in KEPT:
+            # JSON has no infinity: without noise the annotation names no SNR.
+            if name != "snr_db" or entry["noise"]:
+                annotation[f"lowalt:{name}"] = entry[name]
+        annotation["lowalt:geometry"] = entry["geometry"][station.name]
+        annotations.append(annotation)
     return {
         "global": {
             "core:datatype": "cf32_le",
@@ -73,9 +71,9 @@ def metadata(shards: ShardSet, network: Network, place: int, digest: str) -> dic
 
 
 def export(shards: ShardSet, folder: str | Path) -> list[Path]:
-    """Write {station}.sigmf-data and {station}.sigmf-meta of each station into `folder`; return the
-    metadata's paths.
+    """Write {station}.sigmf-data and {station}.sigmf-meta of each station into `folder`.
 
+    Return the paths of the metadata.
     Raises: InputError where the shards hold images, or naming a damaged sample.
     """
     if shards.kind == "image":
@@ -84,19 +82,18 @@ def export(shards: ShardSet, folder: str | Path) -> list[Path]:
         )
     network = Network.from_settings(shards.index["render"]["network"])
     written = []
-    for place, station in enumerate(network.stations):
+    for number, station in enumerate(network.stations):
         data = Path(folder) / f"{station.name}.sigmf-data"
         digest = hashlib.sha512()
         with replacing(data) as temporary, temporary.open("wb") as file:
-            for number in range(len(shards)):
-                span = np.ascontiguousarray(shards.signal(number)[place], "<c8").tobytes()
+            for sample in range(len(shards)):
+                span = np.ascontiguousarray(shards.signal(sample)[number], "<c8").tobytes()
                 digest.update(span)
                 file.write(span)
         written.append(data.with_suffix(".sigmf-meta"))
         with replacing(written[-1]) as temporary:
-            text = json.dumps(
-                metadata(shards, network, place, digest.hexdigest()), indent=1, allow_nan=False
-            )
+            about = metadata(shards, network, number, digest.hexdigest())
+            text = json.dumps(about, indent=1, allow_nan=False)
             temporary.write_text(text + "\n")
     return written
 

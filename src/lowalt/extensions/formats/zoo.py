@@ -1,8 +1,8 @@
 """The zoo: small trained models under 1 MB in `results/zoo`, which `lowalt predict` takes by name.
 
-`python -m lowalt.extensions.formats.zoo --model MODEL.safetensors --views FILES --name NAME` makes an entry of a
-finished run: weights in 8 bits, their answers on the whole validation fold compared with those of
-the weights as trained, and a card.
+`python -m lowalt.extensions.formats.zoo --model MODEL.safetensors --views FILES --name NAME` makes
+an entry of a finished run: weights in 8 bits, their answers on the whole validation fold compared
+with those of the weights as trained, and a card.
 """
 
 import argparse
@@ -40,8 +40,9 @@ def small(content: ModelFile, trusted: str = "") -> ModelFile:
 
 
 def held_against(exact: Trained, entry: Trained, samples: Samples, batch: int = 64) -> dict:
-    """Return how an entry answers samples next to the weights as trained: both in float32, without
-    mirroring.
+    """Return how an entry answers samples next to the weights as trained.
+
+    Both answer in float32, without mirroring.
 
     Keys: samples; exact_percent, percent: accuracies; changed: samples with another answer;
     largest_change: of any probability.
@@ -68,7 +69,8 @@ def entry(
 ) -> dict:
     """Write NAME.safetensors and NAME.md into the zoo and return the measurements.
 
-    model: model.safetensors of a training; samples: its validation fold; trusted: as in `runs.opened`.
+    model: model.safetensors of a training; samples: its validation fold; trusted: as in
+    `runs.opened`.
     Raises: InputError for a name that is no plain file name, samples that are not the validation
     fold of the training, an entry of 1 MB or more, or one that loses accuracy.
     """
@@ -90,9 +92,9 @@ def kept(
     zoo: Path = ZOO,
     trusted: str = "",
 ) -> dict:
-    """Write a model's content in 8 bits as NAME.safetensors and NAME.md and return the
-    measurements, as `entry` does.
+    """Write a model's content in 8 bits as NAME.safetensors and NAME.md.
 
+    Return the measurements, as `entry` does.
     samples: those that both sets of weights answer. Raises: InputError as `entry`, for size and
     accuracy.
     """
@@ -118,9 +120,7 @@ def kept(
 
 
 def main(arguments: list[str]) -> None:
-    """Make an entry of the zoo of a finished training: 8-bit weights, measured on the validation
-    fold, and a card.
-    """
+    """Make an entry of the zoo: 8-bit weights of a finished training, measured, with a card."""
     line = argparse.ArgumentParser(
         prog="python -m lowalt.extensions.formats.zoo", description=main.__doc__
     )

@@ -5,16 +5,15 @@ from pathlib import Path
 from lowalt.files.shipped import SHIPPED, shipped
 
 ZOO = Path("results/zoo")
-"""Where entries lie, from the working directory or, for those that come with the package, from its
-folder.
-"""
+"""Where entries lie, from the working directory or from the package's own folder."""
 
 
 def names() -> list[str]:
     """Return the names of all entries, sorted."""
-    return sorted(
-        {path.stem for folder in (ZOO, SHIPPED / ZOO) for path in folder.glob("*.safetensors")}
-    )
+    found: set[str] = set()
+    for folder in (ZOO, SHIPPED / ZOO):
+        found |= {path.stem for path in folder.glob("*.safetensors")}
+    return sorted(found)
 
 
 def path_of(name: str) -> Path:

@@ -23,18 +23,20 @@ from lowalt.extensions.recordings.evidence import (
     step_bits,
 )
 from lowalt.extensions.recordings.files import channel_of, table_of, times_of
-from lowalt.extensions.recordings.formats import RAW, Table, refuse_kind
+from lowalt.extensions.recordings.formats import MOST_RECORDING_BYTES, RAW, Table, refuse_kind
 from lowalt.extensions.recordings.layouts import raw_readings, readings
 from lowalt.extensions.recordings.mat_files import read_mat
 from lowalt.extensions.recordings.record import Record
-from lowalt.files.array_files import UNREADABLE
+from lowalt.files.array_files import UNREADABLE, array_of
 from lowalt.files.atomic import existing
-from lowalt.files.errors import InputError
+from lowalt.files.errors import InputError, reading
 
 SHOWN = 8
 """Most readings that an inspection lists."""
 MOST_COLUMNS = 16
 """Most columns of a text table that are channels; rows of more hold a chirp each."""
+FEWEST_SAMPLES = 16
+"""Least number of samples that can be a signal."""
 SLOW_SHARE = 5e-4
 LONGEST = 1 << 20
 """Number of samples, from the start, from which spectra are computed."""
@@ -199,7 +201,7 @@ def _arrays(path: Path) -> tuple[list[tuple[dict, np.ndarray]], float | None]:
     a variable says.
     """
     if path.suffix.lower() == ".npy":
-        return [({}, np.load(path, allow_pickle=False))], None
+        return [({}, array_of(path, "recording"))], None
     variables = read_mat(path)
     rate = next(
         (
@@ -251,10 +253,14 @@ def _candidates(
             columns = (
                 array.reshape(len(array), -1) if array.shape[0] >= array.shape[-1] else array.T
             )
+            if long < 2 and columns.shape[1] > MOST_COLUMNS:
+                continue
             found = _of_chirps(array) if long >= 2 else _of_columns(Table(list(columns.T)))
             result += [one._replace(keys={**keys, **one.keys}) for one in found]
     else:
         table, keys = _table(path, carrier_hz)
+        if len(table.columns[0]) < FEWEST_SAMPLES:
+            return [], None, None
         times = times_of(table, _record(path, {"channel": "complex"}, math.nan, None))
         carrier = table.carrier_hz
         rate = table.rate_hz
@@ -303,7 +309,7 @@ def _seen(path: Path, one: Candidate, rate_hz: float, values: np.ndarray | None 
         receivers = chirps.get("receivers", 1)
         whole = chirps["samples"] * receivers
         values = slow_time(values[: len(values) // whole * whole], chirps["samples"], receivers)
-    if not np.isfinite(values).all() or len(values) < 16 or np.ptp(np.abs(values)) == 0:
+    if not np.isfinite(values).all() or len(values) < FEWEST_SAMPLES or np.ptp(np.abs(values)) == 0:
         raise InputError(f"{path}: no signal under {one.keys}")
     return Seen(*one, values, rate_hz, _line(values, rate_hz))
 
@@ -318,12 +324,15 @@ def inspect_recording(
     None takes what the file states. Raises: InputError where the file is missing, of an unknown
     kind, or nothing in it reads as a signal.
     """
-    path = existing(path, "recording")
+    path = existing(path, "recording", MOST_RECORDING_BYTES)
     refuse_kind(path)
-    try:
-        candidates, own_rate, own_carrier = _candidates(path, carrier_hz)
-    except UNREADABLE as error:
-        raise InputError(f"{path}: not a readable {path.suffix} file ({error})") from error
+    with reading(path, f"{path.suffix} file"):
+        return _inspected(path, carrier_hz, rate_hz)
+
+
+def _inspected(path: Path, carrier_hz: float | None, rate_hz: float | None) -> FileInspection:
+    """What the file shows; a damaged one may raise any exception."""
+    candidates, own_rate, own_carrier = _candidates(path, carrier_hz)
     said = tuple(
         name
         for name, given, own in (

@@ -10,7 +10,14 @@ import numpy as np
 from lowalt.extensions.recordings import faults
 from lowalt.extensions.recordings.chirps import slow_time
 from lowalt.extensions.recordings.column_names import rises_evenly, role, unit
-from lowalt.extensions.recordings.formats import RAW, READERS, Table, refuse_kind
+from lowalt.extensions.recordings.formats import (
+    MOST_COLUMNS,
+    MOST_RECORDING_BYTES,
+    RAW,
+    READERS,
+    Table,
+    refuse_kind,
+)
 from lowalt.extensions.recordings.layouts import (
     GROUPS,
     TYPES,
@@ -20,9 +27,8 @@ from lowalt.extensions.recordings.layouts import (
     readings,
 )
 from lowalt.extensions.recordings.record import Record
-from lowalt.files.array_files import UNREADABLE
 from lowalt.files.atomic import existing
-from lowalt.files.errors import InputError
+from lowalt.files.errors import InputError, reading
 
 FEWEST = 1024
 """Least number of numbers in a file whose layout is checked."""
@@ -188,19 +194,17 @@ def table_of(record: Record) -> Table:
     Raises: InputError naming the file where it is missing, of an unknown kind, damaged, or holds no
     sample.
     """
-    path = existing(record.file, "recording")
+    path = existing(record.file, "recording", MOST_RECORDING_BYTES)
     kind = path.suffix.lower()
     if not record.recorded:
         raise InputError(
             f"{path}: the record of a radar without any recording, expected the key `file`"
         )
     refuse_kind(path)
-    try:
+    with reading(path, f"{path.suffix} file"):
         table = READERS[kind](path, record)
-    except InputError:
-        raise
-    except UNREADABLE as error:
-        raise InputError(f"{path}: not a readable {path.suffix} file ({error})") from error
+    if len(table.columns) > MOST_COLUMNS:
+        raise InputError(f"{path}: {len(table.columns)} columns, expected at most {MOST_COLUMNS}")
     if not table.columns or not len(table.columns[0]):
         raise InputError(f"{path}: no samples, expected a recording")
     return table

@@ -22,12 +22,18 @@ from lowalt.extensions.recordings.faults import agreed_rate
 from lowalt.extensions.recordings.layouts import number_type
 from lowalt.extensions.recordings.mat_files import read_mat
 from lowalt.extensions.recordings.record import Record
-from lowalt.files.atomic import text_file
+from lowalt.files.array_files import array_of
+from lowalt.files.atomic import bytes_of, text_file
 from lowalt.files.errors import InputError, lacking
+from lowalt.files.inside import inside
 from lowalt.files.json_objects import read_object
 
 SAME_CARRIER = 1e-3
 """Largest relative difference between the carrier of the record and that of a SigMF capture."""
+MOST_RECORDING_BYTES = 1 << 30
+"""Largest size of a file; the bytes of a sample become sixteen."""
+MOST_COLUMNS = 10_000
+"""Largest number of columns of a file; a table may have a chirp a row."""
 GAP_S = 0.05
 """Largest difference between the stated start of a SigMF capture and the one that its place in the
 samples gives.
@@ -95,9 +101,11 @@ def _wav(path: Path, record: Record) -> Table:
 
     try:
         rate, values = wavfile.read(path)
-    except UnboundLocalError as error:
-        # scipy's reader ends so where a file states no format or holds no data.
-        raise InputError(f"{path}: a .wav file without a format or without samples") from error
+    except (UnboundLocalError, ZeroDivisionError) as error:
+        # scipy's reader ends so where a file states no format or channel, or holds no data.
+        raise InputError(
+            f"{path}: a .wav file without a format or without samples, or of no channel"
+        ) from error
     return Table([values] if values.ndim == 1 else list(values.T), rate_hz=float(rate))
 
 
@@ -159,6 +167,8 @@ def _csv(path: Path, record: Record) -> Table:
         return re.sub(r"(?<=[\d.])[iI](?=\W|$)", "j", dotted.replace(" ", ""))
 
     first = plain(lines[0]).split(delimiter)
+    if len(first) > MOST_COLUMNS:
+        raise InputError(f"{path}: {len(first)} columns, expected at most {MOST_COLUMNS}")
     names = (
         ()
         if all(map(_is_number, first))
@@ -182,7 +192,7 @@ def _csv(path: Path, record: Record) -> Table:
 
 def _npy(path: Path, record: Record) -> Table:
     """Read a NumPy array."""
-    return Table(_columns(np.load(path, allow_pickle=False), path, record))
+    return Table(_columns(array_of(path, "recording"), path, record))
 
 
 def _raw(path: Path, record: Record) -> Table:
@@ -282,7 +292,7 @@ def _samples_alone(path: Path, signal: Any) -> Any:
     """
     import sigmf
 
-    data = Path(signal.data_file).read_bytes()
+    data = bytes_of(signal.data_file, "recording", MOST_RECORDING_BYTES)
     end = len(data) - signal.get_global_field("core:trailing_bytes", 0)
     frame_bytes = signal.get_sample_size() * signal.num_channels
     kept = []
@@ -328,6 +338,8 @@ def _sigmf(path: Path, record: Record) -> Table:
         raise InputError(
             f"{path}: core:dataset is {dataset!r}, expected the name of a file beside it"
         )
+    if dataset is not None:
+        inside(path.parent, dataset, str(path), "core:dataset")
     mixed = _other_bytes(path, metadata)
     try:
         signal = sigmf.sigmffile.fromfile(str(path))

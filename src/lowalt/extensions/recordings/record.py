@@ -9,6 +9,7 @@ from pathlib import Path
 
 from lowalt.config.schema import check_brought, of_brought, with_numbers
 from lowalt.files.errors import InputError
+from lowalt.files.inside import inside
 from lowalt.files.yaml_files import load_yaml
 
 
@@ -50,7 +51,8 @@ class Record:
 def record(block: dict, folder: Path, where: str) -> Record:
     """Return the record in a mapping; its file and its own targets are relative to `folder`.
 
-    Raises: InputError naming `where`, the key, its value and what was expected.
+    Raises: InputError naming `where`, the key, its value and what was expected; also for a file
+    outside of the folder.
     """
     block = with_numbers(
         {key: value for key, value in block.items() if value is not None}, of_brought("recording")
@@ -77,9 +79,14 @@ def record(block: dict, folder: Path, where: str) -> Record:
     if "targets" in block.get("twin", {}):
         block["twin"] = {
             **block["twin"],
-            "targets": [str(folder / name) for name in block["twin"]["targets"]],
+            "targets": [
+                str(inside(folder, name, where, "twin.targets"))
+                for name in block["twin"]["targets"]
+            ],
         }
-    file = folder / block["file"] if "file" in block else Path(where)
+    file = inside(folder, block["file"], where) if "file" in block else Path(where)
+    if file.suffix == ".sigmf-meta":
+        inside(folder, str(Path(block["file"]).with_suffix(".sigmf-data")), where)
     return Record(**{**block, **hertz, "file": file, "columns": columns or None})
 
 

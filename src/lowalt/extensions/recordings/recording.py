@@ -4,7 +4,6 @@ a recogniser.
 
 import argparse
 import math
-import os
 import shlex
 from pathlib import Path
 
@@ -58,7 +57,10 @@ def add_to(commands: argparse._SubParsersAction, name: str) -> None:
         help="draft the N-th reading (default: the first)",
     )
     inspect.add_argument(
-        "--out", type=Path, help="record to write (default: the file's name and .yaml, here)"
+        "--out",
+        type=Path,
+        help="record to write, in the recording's folder or above (default: the file's name and "
+        ".yaml, here, or beside a recording that lies elsewhere)",
     )
     meaning = (
         "simulate the radar of a record, train a network for it, and say which accuracy to expect"
@@ -123,9 +125,17 @@ def _line(inspection: FileInspection, seen: Seen) -> str:
 def drafted(inspection: FileInspection, seen: Seen, folder: Path) -> str:
     """Return the text of a record of a reading, relative to the folder that it is written to;
     guesses are marked.
+
+    Raises: InputError where the recording does not lie in that folder or below.
     """
     mark = "" if seen.said else f"  # GUESSED: fits its samples best, {seen.bits:.2f} bits a byte"
-    path = Path(os.path.relpath(inspection.path.resolve(), folder.resolve())).as_posix()
+    recording = inspection.path.resolve()
+    if not recording.is_relative_to(folder.resolve()):
+        raise InputError(
+            f"--out: the folder {folder} is not that of {inspection.path}, expected a record in the "
+            "recording's folder or above"
+        )
+    path = recording.relative_to(folder.resolve()).as_posix()
     lines = [
         DRAFTED,
         "# Confirm the lines marked GUESSED.",
@@ -171,6 +181,15 @@ def _next(inspection: FileInspection, seen: Seen, out: Path) -> str:
     return f"lowalt recording train {shlex.quote(str(out))} --out my_radar"
 
 
+def _draft_path(recording: Path) -> Path:
+    """Return where the record of a recording goes: here if the recording lies here or below, else
+    beside it, since a record names no file outside of its folder.
+    """
+    name = f"{recording.stem}.yaml"
+    real = recording.resolve()
+    return Path(name) if real.is_relative_to(Path.cwd()) else real.with_name(name)
+
+
 def _inspect(options: argparse.Namespace) -> Answer:
     """Inspect a recording, draw it and draft its record."""
     from lowalt.extensions.recordings.recording_picture import recording_picture
@@ -180,9 +199,9 @@ def _inspect(options: argparse.Namespace) -> Answer:
     if not 1 <= options.take <= count:
         raise InputError(f"--take is {options.take}, expected 1 to {count}, a reading of the list")
     seen = inspection.readings[options.take - 1]
-    out = options.out or Path(f"{options.file.stem}.yaml")
+    out = options.out or _draft_path(inspection.path)
     ready = bool(inspection.carrier_hz and inspection.rate_hz)
-    if ready and out.exists() and not out.read_text(errors="replace").startswith(DRAFTED):
+    if ready and out.is_file() and not out.read_text(errors="replace").startswith(DRAFTED):
         raise InputError(f"{out}: is there already and no draft, expected --out with another name")
     picture = Path(f"{options.file.stem}-inspect.png")
     write_file(

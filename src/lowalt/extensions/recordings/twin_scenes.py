@@ -1,34 +1,14 @@
-"""Scenes of a twin: targets in front of the radar and their courses, drawn from the ranges of a
-configuration.
+"""Scenes of a twin: targets in front of the radar and their courses, drawn from ranges.
 
-A value of a scene is a number, [low, high] for a uniform draw, or [a, b, c, ...] for one whose
-stretches a to b, b to c and so on are equally probable. Keys of a scene (`scene` in
-brought.schema.yaml):
-    subtypes       names of targets, one drawn per sample
-    course         hover | pass | to_and_fro, and the course's own keys:
-                   hover: distance_m, height_m, sway_m, sway_hz, rock_deg
-                   pass: lateral_m, height_m, speed_mps, ahead_m (place along the road at the first
-                   symbol); acceleration_mps2 and curve_per_m (one over the radius of a bend), both
-                   or neither
-                   to_and_fro: near_m, far_m, height_m, speed_mps, turn_s
-    rate_hz        of rotors or wings (optional: the target's own); wheels roll with the speed
-    spread, wander of the rotors' rates, as the effect `rotor_spread` has them (both optional)
-    strength_db    kind of part -> dB on its cross section; foil: dB of foil on a blade
-    texture_db     spread of the points' cross sections; tip: exponent of a blade's growth to its
-    tip (both optional) beam           width_deg and floor_db of the antenna, which looks along +y
-    (optional: all directions) foils          patterns of foil, one drawn per sample (optional)
-    flap           changes of the wing beat, degrees (optional)
-    size           length, width and height as multiples of the subtype's (optional)
-    second         share of samples with a second target, its level_db, and its scene (optional; the
-    same scene) rate_error     of the receiver's clock (optional)
-    receiver       settings of `twin_receiver.Receiver` that differ from those of the radar
-    (optional)
+`TwinScene` lists the keys of a scene (`scene` in brought.schema.yaml). A value of a scene is a
+number, [low, high] for a uniform draw, or [a, b, c, ...] for one whose stretches a to b, b to c and
+so on are equally probable.
 """
 
 import math
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -62,13 +42,15 @@ MARGIN = 40
 """Symbols simulated before and after a stretch; they take the transients of the filters and of the
 analytic signal.
 """
+Setting = float | list[float]
+"""A number, or the ends of the stretches that a draw is taken from."""
 
 
-def value(setting: float | list[float], rng: np.random.Generator) -> float:
-    """Return a setting's value: the number, or a draw from the stretches between the numbers of a
-    list, which are equally probable; uniform within each.
+def value(setting: Setting, rng: np.random.Generator) -> float:
+    """Return the number that a setting states or, for a list, a draw from its stretches.
 
-    Raises: InputError for anything else.
+    The stretches between the numbers of a list are equally probable; the draw is uniform within
+    each. Raises: InputError for anything else.
     """
     if (
         isinstance(setting, list)
@@ -82,10 +64,67 @@ def value(setting: float | list[float], rng: np.random.Generator) -> float:
     return float(setting)
 
 
-def clouds_of(records: dict[str, dict], names: list[str], seed: int) -> dict[str, Cloud]:
-    """Return the built-in clouds of the subtypes `names`; records: the merged record of each
-    subtype.
+@dataclass(frozen=True)
+class TwinScene:
+    """The keys of a scene, with their units; None for a key that the scene does not state.
 
+    A course takes the keys of its own section below; everything else is for any course.
+    """
+
+    subtypes: list[str] | None = None  # names of targets, one drawn per sample
+    others: list[str] | None = None  # kinds of what belongs to no class, in place of targets
+    course: str | None = None  # hover, pass or to_and_fro
+    height_m: Setting | None = None  # over the radar, on every course
+
+    # hover
+    distance_m: Setting | None = None
+    sway_m: Setting | None = None  # rms on each axis
+    sway_hz: Setting | None = None  # fastest sway
+    rock_deg: Setting | None = None  # rms of pitch and roll
+
+    # pass; also speed_mps. acceleration_mps2 and curve_per_m stand both or neither.
+    lateral_m: Setting | None = None
+    ahead_m: Setting | None = None  # position along the road at the first symbol
+    acceleration_mps2: Setting | None = None
+    curve_per_m: Setting | None = None  # one over the radius of a bend
+
+    # to_and_fro; also speed_mps
+    near_m: Setting | None = None
+    far_m: Setting | None = None
+    turn_s: Setting | None = None
+
+    speed_mps: Setting | None = None
+    start_s: Setting = 0.0  # time of the first symbol on the course
+    rate_hz: Setting | None = None  # of rotors or wings, by default the target's own
+    spread: Setting = 0.0  # of the rotors' rates, as the effect `rotor_spread` has it
+    wander: Setting = 0.0  # of the rotors' rates, as the effect `rotor_spread` has it
+    strength_db: dict[str, Setting] | None = None  # kind of part, or foil -> dB
+    texture_db: Setting = 0.0  # spread of the points' cross sections
+    tip: Setting = 0.0  # exponent of a blade's growth to its tip
+    foils: list[str] | None = None  # patterns of foil on blades, one drawn per sample
+    flap: dict[str, Setting] | None = None  # changes of the wing beat, degrees
+    size: dict[str, Setting] | None = None  # length, width, height as multiples of the subtype's
+    beam: dict[str, Setting] | None = None  # width_deg and floor_db, along +y; None: everywhere
+    second: dict | None = None  # a second target: share of samples, level_db, its own scene
+    rate_error: Setting | None = None  # of the receiver's clock, relative
+    receiver: dict[str, Setting] | None = None  # settings of `twin_receiver.Receiver`
+
+    def stated(self, key: str) -> Any:
+        """Return the setting of a key. Raises: KeyError where the scene does not state it."""
+        setting = getattr(self, key)
+        if setting is None:
+            raise KeyError(key)
+        return setting
+
+    def drawn(self, key: str, rng: np.random.Generator) -> float:
+        """Return a value of a key. Raises: KeyError and InputError as `stated` and `value`."""
+        return value(self.stated(key), rng)
+
+
+def clouds_of(records: dict[str, dict], names: list[str], seed: int) -> dict[str, Cloud]:
+    """Return the built-in clouds of the subtypes `names`.
+
+    records: the merged record of each subtype.
     Raises: InputError naming a subtype without a built-in record.
     """
     for name in names:
@@ -97,38 +136,40 @@ def clouds_of(records: dict[str, dict], names: list[str], seed: int) -> dict[str
 
 
 def _course(
-    scene: dict, cloud: Cloud, times_s: np.ndarray, rng: np.random.Generator
+    scene: TwinScene, cloud: Cloud, times_s: np.ndarray, rng: np.random.Generator
 ) -> tuple[Course, float]:
     """The course at the times, and the target's speed (m/s)."""
-
-    def drawn(key: str) -> float:
-        """The value of one of the course's keys."""
-        return value(scene[key], rng)
-
-    kind = scene["course"]
+    kind = scene.stated("course")
     heading = rng.uniform(0, 2 * np.pi)
     if kind == "hover":
-        place = np.array([0.0, drawn("distance_m"), drawn("height_m")])
-        rock = math.radians(drawn("rock_deg"))
-        return hover(times_s, place, heading, drawn("sway_m"), drawn("sway_hz"), rock, rng), 0.0
+        centre = np.array([0.0, scene.drawn("distance_m", rng), scene.drawn("height_m", rng)])
+        rock = math.radians(scene.drawn("rock_deg", rng))
+        sway_m = scene.drawn("sway_m", rng)
+        sway_hz = scene.drawn("sway_hz", rng)
+        return hover(times_s, centre, heading, sway_m, sway_hz, rock, rng), 0.0
     if kind == "pass":
-        place = np.array([drawn("lateral_m"), drawn("ahead_m"), drawn("height_m")])
-        speed = drawn("speed_mps")
-        if "acceleration_mps2" in scene:
-            return _driven(
-                place, speed, drawn("acceleration_mps2"), drawn("curve_per_m"), cloud, times_s
-            )
-        return straight(times_s, place, abs(speed), 0.0 if speed > 0 else math.pi), abs(speed)
+        lateral = scene.drawn("lateral_m", rng)
+        start = np.array([lateral, scene.drawn("ahead_m", rng), scene.drawn("height_m", rng)])
+        speed = scene.drawn("speed_mps", rng)
+        if scene.acceleration_mps2 is not None:
+            acceleration = scene.drawn("acceleration_mps2", rng)
+            curve = scene.drawn("curve_per_m", rng)
+            return _driven(start, speed, acceleration, curve, cloud, times_s)
+        yaw = 0.0 if speed > 0 else math.pi
+        return straight(times_s, start, abs(speed), yaw), abs(speed)
     if kind == "to_and_fro":
-        walk = [drawn(name) for name in ("near_m", "far_m", "speed_mps", "turn_s")]
-        return to_and_fro(
-            times_s, *walk, cloud.record["track_speed_mps"], 0.0, drawn("height_m")
-        ), walk[2]
+        near = scene.drawn("near_m", rng)
+        far = scene.drawn("far_m", rng)
+        speed = scene.drawn("speed_mps", rng)
+        turn = scene.drawn("turn_s", rng)
+        gait_mps = cloud.record["track_speed_mps"]
+        height = scene.drawn("height_m", rng)
+        return to_and_fro(times_s, near, far, speed, turn, gait_mps, 0.0, height), speed
     raise InputError(f"scene: course is {kind!r}, expected hover, pass or to_and_fro")
 
 
 def _driven(
-    place_m: np.ndarray,
+    start_m: np.ndarray,
     speed_mps: float,
     acceleration_mps2: float,
     curve_per_m: float,
@@ -143,100 +184,115 @@ def _driven(
     if "node" in cloud.kinds:
         own_mps = cloud.record["track_speed_mps"]
     yaw = 0.0 if speed_mps > 0 else math.pi
-    course = drive(times_s, place_m, abs(speed_mps), yaw, acceleration_mps2, curve_per_m, own_mps)
+    course = drive(times_s, start_m, abs(speed_mps), yaw, acceleration_mps2, curve_per_m, own_mps)
     if cloud.like in AIRBORNE:
         course = course._replace(clock_s=times_s)
     return course, own_mps
 
 
-def _rate(scene: dict, cloud: Cloud, speed: float, rng: np.random.Generator) -> float:
+def _rate(scene: TwinScene, cloud: Cloud, speed: float, rng: np.random.Generator) -> float:
     """The rate (Hz) of rotors, wings or wheels; wheels roll at the speed (m/s).
 
     Rotors and wings take the rates of the table of targets where the scene says none.
     """
     if cloud.like == "Vehicle":
         return speed / (math.pi * cloud.record["wheel_diameter_m"])
-    if "rate_hz" in scene or cloud.like not in AIRBORNE:
-        return value(scene.get("rate_hz", 0.0), rng)
-    return value(
-        [cloud.record["published"][key] or 0.0 for key in ("freq_lo_hz", "freq_hi_hz")], rng
-    )
+    if scene.rate_hz is not None:
+        return value(scene.rate_hz, rng)
+    if cloud.like not in AIRBORNE:
+        return 0.0
+    published = cloud.record["published"]
+    return value([published["freq_lo_hz"] or 0.0, published["freq_hi_hz"] or 0.0], rng)
 
 
 def heard(
-    twin: Twin, scene: dict, clouds: dict[str, Cloud], rng: np.random.Generator, seconds: float
+    twin: Twin, settings: dict, clouds: dict[str, Cloud], rng: np.random.Generator, seconds: float
 ) -> tuple[np.ndarray, str]:
-    """Return the complex echo (N,) of one drawn scene at the receiver's rate, margins included, and
-    the subtype's name.
+    """Return the complex echo (N,) of one drawn scene at the receiver, and the subtype's name.
 
-    seconds: length without the margins. A second target, where the scene has one, drives at its own
-    place and speed.
+    settings: keys of `TwinScene`; seconds: length without the margins, which the echo includes. A
+    second target, where the scene has one, has a position and speed of its own.
     Raises: InputError for a scene with a wrong key or value.
     """
-    if "others" in scene:
-        kind = scene["others"][int(rng.integers(len(scene["others"])))]
+    scene = TwinScene(**settings)
+    if scene.others is not None:
+        kind = scene.others[int(rng.integers(len(scene.others)))]
         count = math.ceil((seconds + 2 * MARGIN * twin.symbol_interval_s) * twin.rate_hz)
         return other_echo(kind, twin, count, rng), kind
     signal, name = _of_one_target(twin, scene, clouds, rng, seconds)
-    if "second" in scene and rng.uniform() < scene["second"]["share"]:
-        second, _ = _of_one_target(twin, scene["second"].get("scene", scene), clouds, rng, seconds)
-        level = 10 ** (value(scene["second"]["level_db"], rng) / 20)
+    if scene.second is not None and rng.uniform() < scene.second["share"]:
+        other = TwinScene(**scene.second.get("scene", settings))
+        second, _ = _of_one_target(twin, other, clouds, rng, seconds)
+        level = 10 ** (value(scene.second["level_db"], rng) / 20)
         signal = signal + level * rms(signal) / max(rms(second), 1e-300) * second
     return signal, name
 
 
+def _cloud(scene: TwinScene, clouds: dict[str, Cloud], rng: np.random.Generator) -> Cloud:
+    """The cloud of a drawn subtype with the flapping, size and strengths that the scene sets."""
+    subtypes = scene.stated("subtypes")
+    cloud = clouds[subtypes[int(rng.integers(len(subtypes)))]]
+    if scene.flap is not None:
+        flap = {key: value(setting, rng) for key, setting in scene.flap.items()}
+        cloud = replace(cloud, record=cloud.record | {"flap": cloud.record["flap"] | flap})
+    if scene.size is not None:
+        factors = [value(scene.size[axis], rng) for axis in ("width", "length", "height")]
+        cloud = sized(cloud, factors)
+    strengths = scene.strength_db or {}
+    strength = {kind: value(setting, rng) for kind, setting in strengths.items()}
+    foil = ""
+    if scene.foils:
+        foil = scene.foils[int(rng.integers(len(scene.foils)))]
+    cloud = strengthened(cloud, strength, foil)
+    texture_db = value(scene.texture_db, rng)
+    tip = value(scene.tip, rng)
+    return textured(cloud, texture_db, tip, rng)
+
+
 def _of_one_target(
-    twin: Twin, scene: dict, clouds: dict[str, Cloud], rng: np.random.Generator, seconds: float
+    twin: Twin, scene: TwinScene, clouds: dict[str, Cloud], rng: np.random.Generator, seconds: float
+) -> tuple[np.ndarray, str]:
+    """As `_drawn_echo`. Raises: InputError for a key that the scene lacks or that does not fit."""
+    try:
+        return _drawn_echo(twin, scene, clouds, rng, seconds)
+    except KeyError as error:
+        # The record of a target lacks what a key of another kind of target changes, such as flap.
+        raise InputError(
+            f"scene {scene.course!r} of {scene.subtypes}: {error} is missing"
+        ) from None
+
+
+def _drawn_echo(
+    twin: Twin, scene: TwinScene, clouds: dict[str, Cloud], rng: np.random.Generator, seconds: float
 ) -> tuple[np.ndarray, str]:
     """The echo of one drawn target, and its subtype's name."""
-    try:
-        name = scene["subtypes"][int(rng.integers(len(scene["subtypes"])))]
-        cloud = clouds[name]
-        if "flap" in scene:
-            flap = {key: value(setting, rng) for key, setting in scene["flap"].items()}
-            cloud = replace(cloud, record=cloud.record | {"flap": cloud.record["flap"] | flap})
-        if "size" in scene:
-            cloud = sized(
-                cloud, [value(scene["size"][axis], rng) for axis in ("width", "length", "height")]
-            )
-        strength = {
-            kind: value(setting, rng) for kind, setting in scene.get("strength_db", {}).items()
-        }
-        foils = scene.get("foils")
-        cloud = strengthened(cloud, strength, foils[int(rng.integers(len(foils)))] if foils else "")
-        cloud = textured(
-            cloud, *(value(scene.get(key, 0.0), rng) for key in ("texture_db", "tip")), rng
-        )
-        margin = 2 * MARGIN * twin.symbol_interval_s
-        times = np.arange(math.ceil((seconds + margin) * twin.rate_hz)) / twin.rate_hz
-        if "rate_error" in scene:
-            times *= 1 + value(scene["rate_error"], rng)
-        times += value(scene.get("start_s", 0.0), rng)
-        course, speed = _course(scene, cloud, times, rng)
-        row = still_row(cloud, _rate(scene, cloud, speed, rng), rng)
-        if "node" in cloud.kinds:
-            row["start_s"] = float(rng.uniform(0, len(cloud.track) / cloud.record["track_rate_hz"]))
-        wander = [value(scene.get(key, 0.0), rng) for key in ("spread", "wander")]
-        signal = echo(twin, cloud, row, course, times, *wander, rng)
-        if "beam" in scene:
-            signal *= beam_gain(
-                course.place_m,
-                *(value(scene["beam"][key], rng) for key in ("width_deg", "floor_db")),
-            )
-    except KeyError as error:
-        raise InputError(
-            f"scene {scene.get('course')!r} of {scene.get('subtypes')}: {error} is missing"
-        ) from None
-    return signal, name
+    cloud = _cloud(scene, clouds, rng)
+    margin = 2 * MARGIN * twin.symbol_interval_s
+    times = np.arange(math.ceil((seconds + margin) * twin.rate_hz)) / twin.rate_hz
+    if scene.rate_error is not None:
+        times *= 1 + value(scene.rate_error, rng)
+    times += value(scene.start_s, rng)
+    course, speed = _course(scene, cloud, times, rng)
+    row = still_row(cloud, _rate(scene, cloud, speed, rng), rng)
+    if "node" in cloud.kinds:
+        row["start_s"] = float(rng.uniform(0, len(cloud.track) / cloud.record["track_rate_hz"]))
+    spread = value(scene.spread, rng)
+    wander = value(scene.wander, rng)
+    signal = echo(twin, cloud, row, course, times, spread, wander, rng)
+    if scene.beam is not None:
+        width_deg = value(scene.beam["width_deg"], rng)
+        floor_db = value(scene.beam["floor_db"], rng)
+        signal *= beam_gain(course.place_m, width_deg, floor_db)
+    return signal, cloud.subtype
 
 
 def samples(
     twin: Twin, receiver: dict, signal: np.ndarray, rng: np.random.Generator, target: bool = True
 ) -> np.ndarray:
-    """Return the samples (N,) that the receiver records of an echo (N,); its settings are drawn
-    from their ranges.
+    """Return the samples (N,) that a receiver records of an echo (N,).
 
-    target: False for the same receiver and noise without the echo.
+    receiver: its settings, which are drawn from their ranges; target: False for the same receiver
+    and noise without the echo.
     """
     settings = Receiver.from_settings({key: value(item, rng) for key, item in receiver.items()})
     return received(signal, twin.rate_hz, settings, twin.channel == "real", rng, target)
@@ -254,8 +310,11 @@ target is above the noise. The last one is kept anyway."""
 
 
 class Drawn(NamedTuple):
-    """A coherent interval (symbols,) of an echo at a receiver, the same without the echo where
-    targets move, and whether the target stands above the noise."""
+    """A coherent interval (symbols,) of an echo at a receiver.
+
+    quiet: the same without the echo, where targets move; found: whether the target stands above
+    the noise.
+    """
 
     interval: np.ndarray
     quiet: np.ndarray
@@ -263,20 +322,26 @@ class Drawn(NamedTuple):
 
 
 def _drawn(twin: Twin, receiver: dict, signal: np.ndarray, keys: tuple) -> Drawn:
-    """The interval of an echo at a receiver. Where targets move, so that they are not heard all the
-    time, the receiver is drawn again while no target is present."""
+    """The interval of an echo at a receiver.
+
+    A moving target is not heard all the time: the receiver is drawn again while none is present.
+    """
     seconds = twin.symbols * twin.symbol_interval_s
+
+    def interval(redraw: int, target: bool) -> np.ndarray:
+        """The interval (1, symbols) at one drawn receiver."""
+        values = samples(twin, receiver, signal, stream(*keys, redraw), target)
+        return coherent_intervals(stretch(values, twin, seconds), twin.symbols, slow=twin.slow)
+
     for redraw in range(REDRAWS):
-        both = []
-        for target in (True, False) if twin.slowest_mps else (True,):
-            values = samples(twin, receiver, signal, stream(*keys, redraw), target)
-            both.append(
-                coherent_intervals(stretch(values, twin, seconds), twin.symbols, slow=twin.slow)
-            )
-        found = not twin.slowest_mps or bool(present(both[0], twin, both[-1]).all())
+        heard_interval = interval(redraw, target=True)
+        if not twin.slowest_mps:
+            return Drawn(heard_interval[0], heard_interval[0], found=True)
+        quiet = interval(redraw, target=False)
+        found = bool(present(heard_interval, twin, quiet).all())
         if found:
             break
-    return Drawn(both[0][0], both[-1][0], found)
+    return Drawn(heard_interval[0], quiet[0], found)
 
 
 def intervals(
@@ -289,9 +354,9 @@ def intervals(
     receivers: int = 1,
     quiet: bool = False,
 ) -> tuple[np.ndarray, list[str]]:
-    """Return simulated coherent intervals (count, receivers, symbols) and their subtypes' names
-    (count); quiet: the same without the targets, where targets move.
+    """Return simulated coherent intervals (count, receivers, symbols) and their subtypes' names.
 
+    scene: keys of `TwinScene`; quiet: the same without the targets, where targets move.
     Each of `count` scenes is drawn once. Its echo goes to `receivers` receivers, each drawn from
     the scene's ranges. As with recordings, a window counts if its target stands above the noise
     (`presence.present`); a hovering target counts at any SNR. A scene whose target no receiver
@@ -308,9 +373,8 @@ def intervals(
             for receiver in range(receivers):
                 receiver_keys = (seed, "twin-receiver", *keys, *which, receiver)
                 drawn = _drawn(twin, scene["receiver"], signal, receiver_keys)
-                result[number, receiver] = (
-                    drawn.quiet if quiet or name == NOTHING else drawn.interval
-                )
+                without_target = quiet or name == NOTHING
+                result[number, receiver] = drawn.quiet if without_target else drawn.interval
                 heard_by_all = heard_by_all and drawn.found
                 if not drawn.found and again + 1 < REDRAWS and twin.slowest_mps:
                     break
@@ -326,7 +390,7 @@ ROOM_M = 2.5
 """Least distance between the ends of a walk."""
 
 
-def _placed(scene: dict, said: dict) -> dict:
+def _at_distances(scene: dict, said: dict) -> dict:
     """A usual scene with the distances, heights and beam of a record's block `twin`."""
     near, far = said["distance_m"]
     scene = {**scene, "height_m": said["height_m"]}
@@ -361,7 +425,7 @@ def scenes_of(record: Record, snr_db: list[float], usual: dict) -> dict[str, lis
             continue
         scenes = said.get("scenes", {}).get(label)
         if scenes is None:
-            scenes = [_placed(scene, said) for scene in usual["scenes"][label]]
+            scenes = [_at_distances(scene, said) for scene in usual["scenes"][label]]
         elif scenes == "usual":
             scenes = usual["scenes"][label]
         if names := said.get("subtypes", {}).get(label):
@@ -374,8 +438,10 @@ def scenes_of(record: Record, snr_db: list[float], usual: dict) -> dict[str, lis
 
 @dataclass(frozen=True)
 class Library:
-    """All twins of some radars: name -> twin, and category -> scenes, receivers filled in; records:
-    of all targets.
+    """All twins of some radars, their scenes and the records of all targets.
+
+    twins: name -> twin; scenes: name -> category -> scenes with the keys of `TwinScene`, receivers
+    filled in; records: subtype -> record.
     """
 
     seed: int
@@ -385,24 +451,21 @@ class Library:
 
     @classmethod
     def of(cls, radars: dict[str, tuple[Record, Twin, list[float]]]) -> "Library":
-        """Return the library of radars by name, each with its record, its twin and its range of SNR
-        (dB).
+        """Return the library of radars by name: their record, twin and range of SNR (dB).
 
         Raises: InputError where the record of an own target is wrong.
         """
         usual = load_yaml(shipped(SCENES), "usual scenes")
-        own = dict.fromkeys(
-            name for about, *_ in radars.values() for name in (about.twin or {}).get("targets", [])
-        )
-        table = usual["targets"]["table"]
-        records = usual["targets"]["records"]
-        known = load_records(shipped(table), [*map(shipped, records), *own])
-        scenes = {
-            name: scenes_of(about, snr_db, usual) for name, (about, _, snr_db) in radars.items()
-        }
-        return cls(
-            int(usual["seed"]), {name: twin for name, (_, twin, _) in radars.items()}, scenes, known
-        )
+        twins = {}
+        scenes = {}
+        own_targets: dict[str | Path, None] = {}
+        for name, (about, twin, snr_db) in radars.items():
+            twins[name] = twin
+            scenes[name] = scenes_of(about, snr_db, usual)
+            own_targets |= dict.fromkeys((about.twin or {}).get("targets", []))
+        table = shipped(usual["targets"]["table"])
+        files: list[str | Path] = [*map(shipped, usual["targets"]["records"]), *own_targets]
+        return cls(int(usual["seed"]), twins, scenes, load_records(table, files))
 
     @classmethod
     def read(cls, folder: str | Path = RADARS, over: dict | None = None) -> "Library":
@@ -413,11 +476,12 @@ class Library:
         """
         radars = {}
         for name, about in records(folder, over).items():
-            if "snr_db" not in (about.twin or {}):
+            said = about.twin or {}
+            if "snr_db" not in said:
                 raise InputError(
                     f"{about.file}: the record says nothing of twin.snr_db, expected a range in dB"
                 )
-            radars[name] = about, twin_of(about, float(about.rate_hz or 0)), about.twin["snr_db"]
+            radars[name] = about, twin_of(about, float(about.rate_hz or 0)), said["snr_db"]
         return cls.of(radars)
 
     def simulated(
@@ -429,22 +493,20 @@ class Library:
         receivers: int = 1,
         quiet: bool = False,
     ) -> tuple[np.ndarray, list[str]]:
-        """Return simulated intervals (count, receivers, symbols) of a category, and the names of
-        their subtypes.
+        """Return simulated intervals (count, receivers, symbols) of a category and their subtypes.
 
         The category's scenes share the `count` intervals evenly. `purpose` keys the random streams:
         equal purposes give equal scenes. quiet: the same intervals without their targets, as
         `intervals`.
         """
         scenes = self.scenes[twin][category]
-        seconds = [
-            scene["second"]["scene"] for scene in scenes if "scene" in scene.get("second", {})
-        ]
-        subtypes_of_all = dict.fromkeys(
-            name for scene in [*scenes, *seconds] for name in scene.get("subtypes", ())
-        )
+        subtypes_of_all: dict[str, None] = {}
+        for scene in scenes:
+            second = scene.get("second", {}).get("scene", {})
+            subtypes_of_all |= dict.fromkeys(scene.get("subtypes", ()))
+            subtypes_of_all |= dict.fromkeys(second.get("subtypes", ()))
         clouds = clouds_of(self.records, list(subtypes_of_all), self.seed)
-        parts = []
+        of_scenes = []
         names = []
         for number, scene in enumerate(scenes):
             share = len(range(number, count, len(scenes)))
@@ -452,6 +514,6 @@ class Library:
             signals, subtypes = intervals(
                 self.twins[twin], scene, clouds, self.seed, keys, share, receivers, quiet
             )
-            parts.append(signals)
+            of_scenes.append(signals)
             names += subtypes
-        return np.concatenate(parts), names
+        return np.concatenate(of_scenes), names

@@ -11,8 +11,9 @@ from pathlib import Path
 import numpy as np
 from torch import nn
 
+from lowalt.config.brought import refuse_brought, refuse_training
 from lowalt.config.classes import CATEGORIES
-from lowalt.config.layers import load_yaml, merge
+from lowalt.config.layers import load_yaml, merge, read_layer
 from lowalt.extensions.recordings.twin_scenes import Library
 from lowalt.extensions.recordings.window_samples import Windows, facts, rendered
 from lowalt.files.atomic import replacing
@@ -34,11 +35,14 @@ def settings(path: str | Path = RECOGNITION, over: dict | None = None) -> dict:
     and augmentation.
 
     over: keys to lay over those of the file.
-    Raises: InputError naming a missing key.
+    Raises: InputError naming a missing key, or code, weights or files elsewhere that the file's
+    `default` names, or the file itself where it counts as a run's configuration.
     """
-    block = merge(load_yaml(shipped(path), "recognition of recordings"), over or {})
+    block = merge(read_layer(shipped(path)), over or {})
     try:
         default = load_yaml(shipped(block["default"]))
+        refuse_brought(default, block["default"])
+        refuse_training(default, block["default"])
         result = merge(
             default["recognition"],
             {key: block[key] for key in ("size", "training", "augmentation")},

@@ -1,1 +1,4 @@
-"""A town: buildings from a file, and the paths of waves between a station and a target among them."""
+"""A town: buildings from a file, and the paths of waves among them.
+
+Waves go between a station and a target.
+"""

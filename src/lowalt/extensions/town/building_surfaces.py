@@ -1,4 +1,4 @@
-"""The triangles of a file of buildings as its reader finds them, with the names of their materials."""
+"""The triangles of a file of buildings as its reader finds them, and their materials' names."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from lowalt.extensions.town.materials import named
+from lowalt.files.errors import InputError
 from lowalt.targets.mesh_files import metres, pieces
 
 
@@ -25,6 +26,17 @@ class Surfaces(NamedTuple):
     left_out: Mapping[str, int]
     notes: Mapping[str, int]
     unknown: Sequence[str]
+
+
+MOST_TRIANGLES = 500_000
+
+
+def refuse_many(path: Path, triangles: int) -> None:
+    """Raise InputError naming the file for more than MOST_TRIANGLES; readers count before they make
+    them.
+    """
+    if triangles > MOST_TRIANGLES:
+        raise InputError(f"{path}: {triangles} triangles, expected at most {MOST_TRIANGLES}")
 
 
 def such_as(values: Iterable[str]) -> str:
@@ -56,14 +68,17 @@ def joined(
 
 
 def mesh_parts(path: Path, unit: str, up: str) -> tuple[list[tuple[np.ndarray, str]], list[str]]:
-    """Return the corners (F, 3, 3) m, z up, and the material's name of each piece of a mesh file,
-    "" for none that is known, and the names of pieces that are called like no material.
+    """Return the pieces of a mesh file, and the names of those that are called like no material.
+
+    A piece is its corners (F, 3, 3) m, z up, and its material's name, "" for none that is known.
 
     Raises: InputError as the readers of `targets.mesh_files`.
     """
     result = []
     unknown = []
-    for piece in pieces(path):
+    found = pieces(path)
+    refuse_many(path, sum(len(piece.faces) for piece in found))
+    for piece in found:
         corners = np.asarray(piece.vertices, float)[piece.faces] * metres(unit)
         if up == "y":
             corners = np.stack([corners[..., 0], -corners[..., 2], corners[..., 1]], axis=-1)

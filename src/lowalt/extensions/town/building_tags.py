@@ -1,5 +1,6 @@
-"""What the tags of a building say: heights in several units and spellings, and whether a feature is
-a building.
+"""What the tags of a building say: heights, and whether a feature is a building.
+
+Heights come in several units and spellings.
 
 Source: OpenStreetMap wiki, Simple 3D Buildings (height, min_height, building:levels,
 building:min_level, building:part) and Map features/Units.
@@ -26,15 +27,16 @@ UNITS_M = (
 
 
 class Height(NamedTuple):
-    """A height (m), None where none is stated that can be read, and the values that cannot be read."""
+    """A height (m), None where none can be read, and the values that cannot be read."""
 
     metres: float | None
     unread: tuple[str, ...]
 
 
 def metres(value: object) -> float | None:
-    """Return a height such as "12.5 m", "12,5", "~15", "40'6\\"" or "3 storeys" in metres, None for
-    another value.
+    """Return the height in metres that a text states, None for another text.
+
+    Such texts are "12.5 m", "12,5", "~15", "40'6\\"" or "3 storeys".
     """
     text = str(value).strip().lower()
     if match := FEET_AND_INCHES.fullmatch(text):
@@ -46,10 +48,11 @@ def metres(value: object) -> float | None:
 
 
 def _stated(properties: dict, keys: dict[str, str], least_m: float) -> Height:
-    """The first height of at least least_m (m) that the keys state; keys: each with the unit of a
-    bare number.
+    """Return the first height of at least least_m (m) that the keys state.
+
+    keys: each with the unit of a bare number.
     """
-    unread = []
+    unread: list[str] = []
     for key, unit in keys.items():
         value = properties.get(key)
         if value is None:
@@ -69,15 +72,17 @@ def height_of(properties: dict) -> Height:
 
 
 def low_of(properties: dict) -> Height:
-    """Return the height (m) over the ground at which a building begins, such as that of a bridge
-    between two.
+    """Return the height (m) over the ground at which a building begins.
+
+    A bridge between two buildings begins above the ground.
     """
     return _stated(properties, {"min_height": "", "building:min_level": "levels"}, 0.0)
 
 
 def is_building(properties: dict) -> bool:
-    """Return whether a feature is a building and not, say, a road: it is called one, or has a
-    height.
+    """Return whether a feature is a building and not, say, a road.
+
+    It is called one, or has a height.
     """
     kinds = [
         properties[key] for key in ("building", "building:part") if properties.get(key) is not None

@@ -1,5 +1,6 @@
-"""Buildings from a file: a mesh, footprints with heights (GeoJSON), or a Mitsuba scene; in metres,
-z up.
+"""Buildings from a file: a mesh, footprints with heights (GeoJSON), or a Mitsuba scene.
+
+They are in metres, z up.
 """
 
 from functools import lru_cache
@@ -8,14 +9,19 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lowalt.extensions.town.building_surfaces import Surfaces, joined, mesh_parts, such_as
+from lowalt.extensions.town.building_surfaces import (
+    Surfaces,
+    joined,
+    mesh_parts,
+    refuse_many,
+    such_as,
+)
 from lowalt.extensions.town.facets import Town, corner_numbers, sizes, town
 from lowalt.extensions.town.materials import MATERIALS
 from lowalt.files.atomic import existing
 from lowalt.files.errors import InputError, reading
 from lowalt.targets.mesh_files import suffixes
 
-MOST_TRIANGLES = 500_000
 FLOOR_M = 0.05
 """Triangles whose corners are all lower than this are the ground, which is a plane of its own."""
 LOWEST_M = -1.0
@@ -23,8 +29,9 @@ LOWEST_M = -1.0
 TALLEST_M = (2.0, 900.0)
 SMALLEST_M = 3.0
 LARGEST_M = 20_000.0
-"""Heights of the tallest building, and least and largest extents of a town, outside of which the
-unit is wrong.
+"""Heights of the tallest building, and least and largest extents of a town.
+
+Outside of these the unit is wrong.
 """
 
 SMALLEST_M2 = 5e-7
@@ -35,8 +42,9 @@ KEYS = ("height_m", "unit", "up", "material", "ground", "left_out")
 
 
 class Buildings(NamedTuple):
-    """A town that was read: its paths' `town`, its triangles' corners (F, 3, 3) m, and what was
-    merged or dropped.
+    """A town that was read.
+
+    town: of its paths; corners: (F, 3, 3) m, of its triangles; facts: what was merged or dropped.
     """
 
     town: Town
@@ -45,7 +53,7 @@ class Buildings(NamedTuple):
 
 
 def _surfaces(path: Path, settings: dict) -> Surfaces:
-    """The surfaces of a file by its ending, moved so that the origin of the settings is (0, 0, 0)."""
+    """The surfaces of a file by its ending, moved so that the settings' origin is (0, 0, 0)."""
     kind = path.suffix.lower()
     origin = settings["origin"]
     if kind in (".geojson", ".json"):
@@ -71,8 +79,9 @@ def _surfaces(path: Path, settings: dict) -> Surfaces:
 
 
 def _cleaned(path: Path, found: Surfaces) -> tuple[np.ndarray, np.ndarray, dict[str, int]]:
-    """Corners (F, 3, 3) and materials (F,) without the ground, triangles without an area and
-    repeated ones.
+    """Return corners (F, 3, 3) and materials (F,) of the buildings alone.
+
+    The ground, triangles without an area and repeated ones are left out.
 
     Raises: InputError for no triangle, too many, numbers that are not finite, or a town of the
     wrong size.
@@ -82,8 +91,7 @@ def _cleaned(path: Path, found: Surfaces) -> tuple[np.ndarray, np.ndarray, dict[
     dropped = dict(found.left_out)
     if not len(corners):
         raise InputError(f"{path}: has no surface of a building, expected some")
-    if len(corners) > MOST_TRIANGLES:
-        raise InputError(f"{path}: {len(corners)} triangles, expected at most {MOST_TRIANGLES}")
+    refuse_many(path, len(corners))
     if not np.isfinite(corners).all() or abs(corners).max() > 1e9:
         raise InputError(f"{path}: a corner is NaN, infinite or beyond 1e9 m, expected finite ones")
     low = corners.min(axis=(0, 1))
@@ -129,8 +137,9 @@ def files_of(buildings: str | Path) -> list[str]:
 
 
 def read(settings: dict) -> Buildings:
-    """Return the buildings of the file that the settings of the effect `town` name; the last few
-    are kept.
+    """Return the buildings of the file that the settings of the effect `town` name.
+
+    The last few are kept.
 
     Raises: InputError naming the file and what is wrong with it, or a material that is not known.
     """

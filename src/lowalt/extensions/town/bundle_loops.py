@@ -31,8 +31,9 @@ class Bundle(NamedTuple):
 
 
 class RaySpan(NamedTuple):
-    """The least and largest starts and ways of rays, (3, 3) m each: a row for each leg of a path,
-    the first where rays have one leg.
+    """The least and largest starts and ways of rays, (3, 3) m each.
+
+    There is a row for each leg of a path, the first where rays have one leg.
     """
 
     low_start: np.ndarray
@@ -106,8 +107,9 @@ def bundled(starts, ends, span, bundle):
 
 @INNER
 def _meets(boxes, box):
-    """Whether a bundle, by its boxes (12,), may meet a box (6,) between the rays' starts and ends,
-    see `rays_loops.can_meet`.
+    """Whether a bundle, by its boxes (12,), may meet a box (6,) between the rays' ends.
+
+    See `rays_loops.can_meet`.
     """
     for i in range(3):
         start = boxes[i]
@@ -162,8 +164,9 @@ def between(occluders, bundle, found):
 
 @PLAIN
 def near(occluders, starts, ends, room, found):
-    """Fill found (F,) with the triangles within about `room` (m) of rays between points (P, 3) m;
-    return how many.
+    """Fill found (F,) with the triangles within about `room` (m) of rays between points (P, 3) m.
+
+    Returns how many there are.
     """
     bundle = empty_bundle()
     bundled(starts, ends, empty_span(), bundle)
@@ -190,8 +193,9 @@ def blocked(occluders, starts, ends):
 
 @INNER
 def _stops(facets, occluders, row, start, end):
-    """Whether the triangle of this row, or its facet where that is convex, lies between two points
-    (3,).
+    """Whether a triangle, or its facet where that is convex, lies between two points (3,).
+
+    row: of the triangle.
     """
     facet = occluders.facet[row]
     if not facets.convex[facet]:
@@ -204,8 +208,9 @@ def _stops(facets, occluders, row, start, end):
 
 @INNER
 def dark(facets, occluders, starts, ends, rows):
-    """Return whether one of the triangles `rows`, alone or with its convex facet, blocks all rays
-    of a block.
+    """Return whether one of the triangles `rows` blocks all rays of a block.
+
+    A triangle counts alone or with its convex facet.
 
     starts, ends: (C, 3), of the rays to a box's corners; these decide, since the shadow of a convex
     shape is convex.

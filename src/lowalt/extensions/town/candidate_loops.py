@@ -1,4 +1,7 @@
-"""Candidates: the facets that may reflect a wave from a station to a target, before rays are traced."""
+"""Candidates: the facets that may reflect a wave from a station to a target.
+
+They are found before rays are traced.
+"""
 
 import math
 from typing import NamedTuple
@@ -11,8 +14,10 @@ from lowalt.machine.jit import INLINED, INNER, PLAIN
 
 
 class BoxCorners(NamedTuple):
-    """The corners of a box as a facet sees them: point (8, 3) m, in binary order of the axes;
-    height (8,) m over the facet's plane; foot (8, 2) m, the corner's projection onto that plane.
+    """The corners of a box as a facet sees them.
+
+    point: (8, 3) m, in binary order of the axes; height: (8,) m over the facet's plane; foot: (8,
+    2) m, the corner's projection onto that plane.
     """
 
     point: np.ndarray
@@ -67,8 +72,9 @@ def _reaches(facets, k, source, target, radius):
 
 @PLAIN
 def ordered_pairs(facets, firsts, source, radii):
-    """Return the pairs (P, 2) of facets such that the first may reflect a ray from a source to the
-    second.
+    """Return the pairs (P, 2) of facets such that the first may reflect a ray to the second.
+
+    The ray comes from a source.
 
     firsts: (K,) bool, which may come first; radii: (K,) m, around the facets' centres, infinite for
     the ground.
@@ -101,8 +107,9 @@ def ordered_pairs(facets, firsts, source, radii):
 
 @INLINED
 def _passes(facets, k, source, box):
-    """Whether the points of reflection at facet k of all rays from a source to a box, by its
-    corners' `point`, lie on one side of the facet.
+    """Return whether all points of reflection lie on one side of a facet.
+
+    They are those at facet k of all rays from a source to a box, by its corners' `point`.
 
     A projection keeps convex sets convex, so the corners of the piece of the box on the source's
     side bound them. a, b and x, y are coordinates in the rectangle around the facet: of the source,
@@ -172,8 +179,9 @@ def _passes(facets, k, source, box):
 
 @INLINED
 def misses(facets, route, station, low, high, source, box):
-    """Return whether surely no ray from a station by the facets of a route ends in the box between
-    two corners (3,) m.
+    """Return whether surely no ray from a station by the facets of a route ends in a box.
+
+    The box lies between two corners (3,) m.
 
     False does not say that one does. source (3,), box: work space.
     """
@@ -194,8 +202,9 @@ def misses(facets, route, station, low, high, source, box):
 
 @PLAIN
 def fitting(facets, routes, station, low, high):
-    """Return those of the routes (P, 1 or 2) by which rays from a station may end in the box
-    between two corners (3,) m.
+    """Return those of the routes (P, 1 or 2) by which rays from a station may end in a box.
+
+    The box lies between two corners (3,) m.
 
     Spheres around the box sort out most of them, before `misses` holds the box itself to the
     facets.
@@ -233,8 +242,9 @@ def fitting(facets, routes, station, low, high):
 
 @PLAIN
 def hidden(facets, occluders, which, corners):
-    """Return for facets `which` (B,) whether one convex surface hides all of it from a whole box,
-    corners (8, 3) m.
+    """Return whether one convex surface hides all of a facet from a whole box, for each facet.
+
+    which: (B,), the facets; corners: (8, 3) m, of the box.
     """
     result = np.zeros(len(which), np.bool_)
     bundle = empty_bundle()

@@ -1,5 +1,6 @@
-"""The compiled loops of `knife_edge`: the outline of a screen across a ray, the parameters nu of its
-edges, and the field behind it.
+"""The compiled loops of `knife_edge`: a screen across a ray, and the field behind it.
+
+They find the screen's outline and the parameters nu of its edges.
 """
 
 import math
@@ -17,8 +18,9 @@ from lowalt.scene.response_loops import phasor
 CLEAR = -0.78
 """Below this nu an edge may be neglected. Source: ITU-R P.526-15, section 4.1."""
 FREE = 2.0 * CLEAR
-"""Below this nu an edge leaves a wave as it is; from here to CLEAR its effect grows from none to
-all of it.
+"""Below this nu an edge leaves a wave as it is.
+
+From here to CLEAR its effect grows from none to all of it.
 """
 FAR_M = 1e5
 """Distance of an edge around which no wave passes."""
@@ -34,8 +36,9 @@ DEGREE = 7
 
 
 def _pieces() -> np.ndarray:
-    """Real and imaginary parts (PIECES, 2, DEGREE + 1) of polynomials of (1 + nu) erfcx(nu (1 + j)
-    sqrt(pi) / 2) / 2.
+    """Return polynomials (PIECES, 2, DEGREE + 1) that stand for Fresnel's integral.
+
+    They are real and imaginary parts of (1 + nu) erfcx(nu (1 + j) sqrt(pi) / 2) / 2.
 
     Each interpolates at Chebyshev points of one piece of nu / (nu + 1), in which the function is
     smooth.
@@ -57,8 +60,9 @@ _PIECES = _pieces()
 
 @INNER
 def _edge(nu):
-    """The field behind a knife edge over that in free space, for its parameter nu: its real and
-    imaginary part.
+    """The field behind a knife edge over that in free space, for its parameter nu.
+
+    The result is its real and imaginary part.
 
     (1 + j) / 2 times the integral of exp(-j pi t^2 / 2) from nu on, for waves exp(-j k r); -20 lg
     of its magnitude is J(nu). Source: ITU-R P.526-15, equations 7, 28 and 30; complementary error
@@ -102,8 +106,10 @@ def fields(nu, result):
 
 
 class Outline(NamedTuple):
-    """A screen across a ray: the ends of its top edge, top (2, 3) m, and a point each of its left
-    and its right edge, sides (2, 3) m.
+    """A screen across a ray.
+
+    top: (2, 3) m, the ends of its top edge; sides: (2, 3) m, a point each of its left and its right
+    edge.
     """
 
     top: np.ndarray
@@ -112,8 +118,9 @@ class Outline(NamedTuple):
 
 @INNER
 def _along(start, way, point):
-    """Project a point onto a way (3,) from a start (3,) in the plan: share of the way, and distance
-    to its left (m).
+    """Project a point onto a way (3,) from a start (3,) in the plan.
+
+    Returns the share of the way, and the distance to its left (m).
     """
     x = point[0] - start[0]
     y = point[1] - start[1]
@@ -125,8 +132,9 @@ def _along(start, way, point):
 
 @INNER
 def _longer(along_m, off_m):
-    """How much longer (m) a way is that ends `off_m` beside another one of `along_m`, without
-    cancellation.
+    """How much longer (m) a way is that ends `off_m` beside another one of `along_m`.
+
+    Nothing cancels.
     """
     length = math.sqrt(along_m * along_m + off_m * off_m)
     if along_m > 0.0:
@@ -136,8 +144,9 @@ def _longer(along_m, off_m):
 
 @INNER
 def _nu(off_m, share, length_m, wavelength_m):
-    """The parameter nu of an edge `off_m` beyond a ray, at this share of its length: 2 sqrt(detour
-    / wavelength).
+    """The parameter nu of an edge `off_m` beyond a ray, at this share of its length.
+
+    It is 2 sqrt(detour / wavelength).
 
     Equation 26 of P.526-15 has the first term of the detour alone, which is too long for a steep
     one.
@@ -157,8 +166,9 @@ def _top_nu(rise_m, share, way, length_m, wavelength_m):
 
 @INNER
 def _over(outline, start, way):
-    """Height (m) of a screen's top edge above a way (3,) from a start (3,), and the shares of way
-    and edge there.
+    """Height (m) of a screen's top edge above a way (3,) from a start (3,).
+
+    The shares of way and edge there come second and third.
     """
     first = outline.top[0]
     last = outline.top[1]
@@ -177,8 +187,9 @@ def _over(outline, start, way):
 
 @PLAIN
 def edges_nu(outline, start, ends, wavelength_m, result):
-    """Fill result (3, R) with the nu of the edges TOP, LEFT and RIGHT for rays from a start (3,) to
-    ends (R, 3).
+    """Fill result (3, R) with the nu of the edges TOP, LEFT and RIGHT.
+
+    Rays go from a start (3,) to ends (R, 3).
     """
     way = np.empty(3)
     for r in range(len(ends)):
@@ -195,8 +206,9 @@ def edges_nu(outline, start, ends, wavelength_m, result):
 
 @PLAIN
 def pass_point(outline, start, end, wavelength_m, point):
-    """Set point (3,) m to that of a screen's outline by which the strongest wave passes from start
-    to end; where two edges are passed by waves about as strong, to one between them.
+    """Set point (3,) m to where the strongest wave passes a screen's outline from start to end.
+
+    Where two edges are passed by waves about as strong, the point lies between them.
     """
     way = end - start
     nu = np.empty((3, 1))
@@ -225,8 +237,10 @@ def pass_point(outline, start, end, wavelength_m, point):
 
 @INNER
 def _beside(edge, k, start, way, other, corner):
-    """Set corner (3,) to end k of an edge (2, 3); return whether it projects onto the way (3,) from
-    a start (3,), and its share of the way and distance to the left (`_along`).
+    """Set corner (3,) to end k of an edge (2, 3), and project it onto a way (3,).
+
+    The way begins at a start (3,). Returns whether it projects onto the way, and its share of the
+    way and distance to the left (`_along`).
 
     other: share of the way at which the other end projects. Where end k projects outside the way,
     the edge is cut at the way's nearer end, and the corner moved FAR_M to its side, because the
@@ -260,8 +274,9 @@ def _level_top(outline, corner, way):
 
 @PLAIN
 def draw_outline(edges, start, end, wavelength_m, outline):
-    """Fill the outline of the screen that a building's edges (E, 2, 3) form across the ray from
-    start to end; return whether any edge projects onto the ray.
+    """Fill the outline of the screen that a building's edges (E, 2, 3) form across a ray.
+
+    The ray goes from start to end. Returns whether any edge projects onto it.
     """
     way = end - start
     corner = np.empty(3)

@@ -1,5 +1,6 @@
-"""The plane facets of a town's triangles, and the tree of boxes in which rays look for triangles
-that block them.
+"""The plane facets of a town's triangles, and the tree of boxes of those that block rays.
+
+Rays look for them in the tree.
 """
 
 from itertools import pairwise
@@ -10,17 +11,25 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import ConvexHull
 
+from lowalt.files.errors import InputError
 from lowalt.numerics import portable
 from lowalt.scene import rays
 
 GRID_M = 1e-3
-"""Corners in the same cell of this grid are one corner: files in single precision repeat corners
-with other digits.
+"""Corners in the same cell of this grid are one corner.
+
+Files in single precision repeat corners with other digits.
 """
+FEW = 64
+"""Number of a building's corners that are compared with all its facets first."""
+BLOCK = 1 << 20
+MOST_COMPARED = 1_000_000_000
+"""Numbers of pairs of a facet and a corner that are compared at once, and in all of a town."""
 FLAT_M = 0.02
 PARALLEL = 1e-3
-"""Corners of a facet are at most this far off its plane; normals of neighbouring triangles differ
-by at most this.
+"""Corners of a facet are at most FLAT_M off its plane.
+
+Normals of neighbouring triangles differ by at most PARALLEL.
 """
 
 
@@ -30,10 +39,9 @@ class Facets(NamedTuple):
     normal (K, 3) and offset (K,) m: a facet's plane is normal . x = offset; centre (K, 3) m, across
     and up (K, 3), half (K, 2) m: a rectangle in the plane that holds the facet, infinite for the
     ground; first (K + 1,): a facet's triangles are rows first[k] to first[k + 1] of triangles (F,
-    9) m, a corner and two edges; the ground has none;
-    convex: (K,) bool, whether the triangles fill a convex polygon; outward: (K,), 1 or -1 where the
-    normal points out of or into a closed convex building, within which there are no rays, and 0 for
-    other facets.
+    9) m, a corner and two edges; the ground has none; convex: (K,) bool, whether the triangles fill
+    a convex polygon; outward: (K,), 1 or -1 where the normal points out of or into a closed convex
+    building, within which there are no rays, and 0 for other facets.
     """
 
     normal: np.ndarray
@@ -49,8 +57,9 @@ class Facets(NamedTuple):
 
 
 class Occluders(NamedTuple):
-    """The triangles (F, 9) in a tree of boxes (2 B, 6) as `rays.tree` makes it, and the facet (F,)
-    of each.
+    """The triangles that block rays.
+
+    boxes: (2 B, 6), a tree as `rays.tree` makes it; triangles: (F, 9); facet: (F,), that of each.
     """
 
     boxes: np.ndarray
@@ -63,9 +72,8 @@ class Town(NamedTuple):
 
     material: (K,) number of each facet's material in `materials`; building: (F,) number of the
     building of each triangle of `facets`; edges: (E, 2, 3) m, edges that are not inside a facet,
-    and of_building (E,), their buildings;
-    pairs: cache, by the station's position (3,) m, of the pairs (P, 2) of facets that may reflect its
-    rays in turn.
+    and of_building (E,), their buildings; pairs: cache, by the station's position (3,) m, of the
+    pairs (P, 2) of facets that may reflect its rays in turn.
     """
 
     facets: Facets
@@ -79,15 +87,16 @@ class Town(NamedTuple):
 
 
 def corner_numbers(corners: np.ndarray) -> np.ndarray:
-    """Return the number (F, 3) of each corner of triangles (F, 3, 3) m, equal for corners in one
-    cell of GRID_M.
+    """Return the number (F, 3) of each corner of triangles (F, 3, 3) m.
+
+    It is equal for corners in one cell of GRID_M.
     """
     cells = np.rint(corners.reshape(-1, 3) / GRID_M).astype(np.int64)
     return np.unique(cells, axis=0, return_inverse=True)[1].reshape(-1, 3)
 
 
 def sizes(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return unit normals (F, 3), NaN without an area, and areas (F,) m2 of triangles (F, 3, 3) m."""
+    """Return unit normals (F, 3), NaN without an area, and areas (F,) m2 of triangles (F, 3, 3)."""
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     twice = np.linalg.norm(across, axis=1)
     with np.errstate(invalid="ignore"):
@@ -95,8 +104,9 @@ def sizes(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _edges(numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The edges (3 F, 2) of triangles by their corners' numbers, the smaller first, and the
-    triangle (3 F,) of each.
+    """The edges (3 F, 2) of triangles by their corners' numbers, and the triangle (3 F,) of each.
+
+    The smaller number comes first.
     """
     edges = np.concatenate([numbers[:, [0, 1]], numbers[:, [1, 2]], numbers[:, [2, 0]]])
     triangle_of = np.tile(np.arange(len(numbers)), 3)
@@ -104,8 +114,9 @@ def _edges(numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def labels(corners: np.ndarray, numbers: np.ndarray, material: np.ndarray) -> np.ndarray:
-    """Return the facet (F,) of each triangle: neighbours in one plane and of one material share a
-    facet.
+    """Return the facet (F,) of each triangle.
+
+    Neighbours in one plane and of one material share a facet.
 
     A facet that is not flat, such as a finely divided dome, falls apart into its triangles.
     """
@@ -168,16 +179,38 @@ def _outward(
     lone = (np.bincount(which)[which] != 2) & (height[edges].max(axis=1) > FLAT_M)
     result = np.zeros(len(planes))
     order = np.argsort(building, kind="stable")
+    compared = 0
     starts = np.searchsorted(building[order], np.arange(int(building.max()) + 2))
     for number in np.setdiff1d(building, building[triangle_of[lone]]):
         triangles = order[starts[number] : starts[number + 1]]
         facets = np.unique(label[triangles])
-        points = corners[triangles].reshape(-1, 3)
-        over = portable.product(planes[facets, :3], points.T) - planes[facets, 3:]
-        all_below = over.max(axis=1) <= FLAT_M
-        all_above = over.min(axis=1) >= -FLAT_M
-        result[facets] = all_below.astype(float) - all_above
+        points = np.unique(corners[triangles].reshape(-1, 3), axis=0)
+        # Most facets of a building with dents have corners on both sides among a few of them.
+        some = points[:: -(-len(points) // FEW)]
+        below, above = _one_sided(planes[facets], some)
+        facets = facets[below | above]
+        compared += len(facets) * len(points)
+        if compared > MOST_COMPARED:
+            raise InputError(
+                f"a building of {len(facets)} facets and {len(points)} corners, expected fewer: "
+                "divide its round walls less finely"
+            )
+        below, above = _one_sided(planes[facets], points)
+        result[facets] = below.astype(float) - above
     return result
+
+
+def _one_sided(planes: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Whether points (P, 3) m lie all below and all above planes (K, 4), two of (K,) bool."""
+    below = np.ones(len(planes), bool)
+    above = np.ones(len(planes), bool)
+    rows = max(1, BLOCK // max(1, len(points)))
+    for first in range(0, len(planes), rows):
+        block = slice(first, first + rows)
+        over = portable.product(planes[block, :3], points.T) - planes[block, 3:]
+        below[block] = over.max(axis=1) <= FLAT_M
+        above[block] = over.min(axis=1) >= -FLAT_M
+    return below, above
 
 
 def town(
@@ -226,8 +259,8 @@ def _facets(
 ) -> Facets:
     """The facets of triangles that stand in the order of their facets, and the ground.
 
-    corners (F, 3, 3) m, numbers (F, 3), label and building (F,): of the triangles; first (K + 1,) and
-    triangles (F, 9) as in `Facets`.
+    corners (F, 3, 3) m, numbers (F, 3), label and building (F,): of the triangles; first (K + 1,)
+    and triangles (F, 9) as in `Facets`.
     """
     normal, area = sizes(corners)
     largest = np.array([a + area[a:b].argmax() for a, b in pairwise(first)])
@@ -263,14 +296,15 @@ def _facets(
 def _ridges(
     corners: np.ndarray, numbers: np.ndarray, label: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The edges (E, 2, 3) m at the rims of facets, their buildings (E,), and the building (F,) of
-    each triangle.
+    """The edges (E, 2, 3) m at the rims of facets, their buildings (E,), and the triangles'.
+
+    The latter are the building (F,) of each triangle.
     """
     links = np.concatenate([numbers[:, :2], numbers[:, 1:]])
     size = int(numbers.max()) + 1
     graph = coo_array((np.ones(len(links), np.int8), links.T), shape=(size, size))
-    building = connected_components(graph, directed=False)[1]
-    building = np.unique(building[numbers[:, 0]], return_inverse=True)[1]
+    connected = connected_components(graph, directed=False)[1]
+    building = np.unique(connected[numbers[:, 0]], return_inverse=True)[1]
     edges, triangle_of = _edges(numbers)
     of_facet = np.column_stack([edges, label[triangle_of]])
     _, which = np.unique(of_facet, axis=0, return_inverse=True)

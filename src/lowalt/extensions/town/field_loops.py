@@ -13,8 +13,9 @@ UPRIGHT = 1e-12
 
 @INNER
 def _bounced(normal, epsilon, way, field):
-    """Reflect a wave's way (3,) and its complex field (3,) at a plane: Fresnel's coefficients of a
-    lossy half space.
+    """Reflect a wave's way (3,) and its complex field (3,) at a plane.
+
+    Fresnel's coefficients are those of a lossy half space.
 
     s is the direction across the plane of incidence, p the one in it and across the way; the field
     along p counts as the vertical one of `fresnel.fresnel`.
@@ -73,8 +74,9 @@ def _vertical(way, field):
 
 @PLAIN
 def coefficients(facets, epsilons, route, station, points, present, images, result):
-    """Fill images (N, 3, L) m, where the station sees the points (N, L, 3) m by a route, and result
-    (N, L), the path's coefficient.
+    """Fill images (N, 3, L) m and result (N, L), the coefficients of a path.
+
+    The images are where the station sees the points (N, L, 3) m by a route.
 
     epsilons: (K,) complex relative permittivity of each facet; present: (N, L), where there is a
     ray; elsewhere the image is given too and the coefficient is 0. Vertical polarisation is sent

@@ -13,7 +13,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lowalt.extensions.town.building_surfaces import Surfaces, joined, such_as
+from lowalt.extensions.town.building_surfaces import (
+    MOST_TRIANGLES,
+    Surfaces,
+    joined,
+    such_as,
+)
 from lowalt.extensions.town.building_tags import height_of, is_building, is_part, low_of
 from lowalt.extensions.town.materials import named
 from lowalt.files.atomic import text_of
@@ -28,7 +33,12 @@ try:
 except ImportError as error:
     raise lacking(error) from None
 
-LARGEST_BYTES = 200 << 20
+LARGEST_BYTES = 64 << 20
+MOST_PLACES = MOST_TRIANGLES // 3
+MOST_CORNERS = 10_000
+"""Largest number of corners of all outlines, each of which makes two triangles of a wall and one of
+a roof, and of one feature, whose triangulation takes a time beyond proportion.
+"""
 JOINT_M = 1e-3
 """Parts of a footprint that are no farther apart adjoin."""
 NO_BUILDING = "features that are no buildings"
@@ -38,8 +48,9 @@ NO_HEIGHT = "buildings that end below where they begin"
 
 
 class Footprint(NamedTuple):
-    """A building of a file: its outline, in degrees or metres, its properties, and where it stands
-    in the file.
+    """A building of a file.
+
+    outline: in degrees or metres; properties: its tags; place: where it stands in the file.
     """
 
     outline: Polygon | MultiPolygon
@@ -61,17 +72,18 @@ def _prism(polygon: Polygon, height_m: float, low_m: float) -> np.ndarray:
     triangles = shapely.constrained_delaunay_triangles(polygon).geoms
     corners_of = [np.asarray(orient(triangle).exterior.coords)[:3, :2] for triangle in triangles]
     roof = np.array(corners_of).reshape(-1, 3, 2)
-    roofs = [np.concatenate([roof, np.full((*roof.shape[:2], 1), height_m)], axis=2)]
+    level = (*roof.shape[:2], 1)
+    roofs = [np.concatenate([roof, np.full(level, height_m)], axis=2)]
     if low_m > 0.0:
-        roofs.append(np.concatenate([roof[:, ::-1], np.full((*roof.shape[:2], 1), low_m)], axis=2))
+        underside = roof[:, ::-1]
+        roofs.append(np.concatenate([underside, np.full(level, low_m)], axis=2))
     return np.concatenate([*walls, *roofs])
 
 
 def _features(path: Path) -> list:
     """The features of a file. Raises: InputError where it has none."""
-    if path.stat().st_size > LARGEST_BYTES:
-        raise InputError(f"{path}: over {LARGEST_BYTES >> 20} MiB, expected a town")
-    features = json_object(text_of(path, "file of buildings"), str(path), "GeoJSON").get("features")
+    text = text_of(path, "file of buildings", LARGEST_BYTES)
+    features = json_object(text, str(path), "GeoJSON").get("features")
     if not isinstance(features, list):
         raise InputError(f"{path}: has no list `features`, expected a GeoJSON FeatureCollection")
     return features
@@ -87,16 +99,30 @@ def _object_of(feature: dict, key: str, place: str) -> dict:
     return value
 
 
+def _places(coordinates: object) -> int:
+    """The number of lists of numbers in nested lists, which are places."""
+    count = 0
+    waiting = [coordinates]
+    while waiting:
+        value = waiting.pop()
+        if isinstance(value, list) and value:
+            if isinstance(value[0], list):
+                waiting += value
+            else:
+                count += 1
+    return count
+
+
 def _footprints(path: Path, all_polygons: bool) -> tuple[list[Footprint], Counter, Counter]:
-    """The buildings of a file in degrees, what was left out, and what was read otherwise than
-    stated.
+    """The buildings of a file in degrees, what was left out, and what was not read as stated.
 
     all_polygons: whether all polygons of a file without any tag of buildings are buildings.
     """
-    found = []
-    others = []
-    left_out = Counter()
-    notes = Counter()
+    found: list[Footprint] = []
+    others: list[Footprint] = []
+    left_out: Counter[str] = Counter()
+    notes: Counter[str] = Counter()
+    places = 0
     for number, feature in enumerate(_features(path)):
         place = f"features[{number}]"
         if not isinstance(feature, dict):
@@ -111,6 +137,13 @@ def _footprints(path: Path, all_polygons: bool) -> tuple[list[Footprint], Counte
         if not called and not all_polygons:
             left_out[NO_BUILDING] += 1
             continue
+        own_places = _places(geometry.get("coordinates"))
+        places += own_places
+        if own_places > MOST_CORNERS or places > MOST_PLACES:
+            raise InputError(
+                f"{path}: {place}: {own_places} corners, {places} with those before it, expected "
+                f"at most {MOST_CORNERS} of a building and {MOST_PLACES} of a town"
+            )
         try:
             outline = shapely.force_2d(shape(geometry))
         except Exception as error:
@@ -155,12 +188,14 @@ def middle_of(path: Path, height_m: float | None) -> tuple[float, float]:
         found, _, _ = _footprints(path, height_m is not None)
         if not found:
             raise InputError(
-                f"{path}: has no building, expected polygons with the key building or height, "
-                "or --height, with which polygons without a tag of buildings are read as well"
+                f"{path}: has no building, expected polygons with the key building or height, or "
+                "--height, with which polygons without a tag of buildings are read as well"
             )
         bounds = np.array([footprint.outline.bounds for footprint in found])
         low_x, low_y, high_x, high_y = bounds.T
-    return float((low_x.min() + high_x.max()) / 2), float((low_y.min() + high_y.max()) / 2)
+    longitude = (low_x.min() + high_x.max()) / 2
+    latitude = (low_y.min() + high_y.max()) / 2
+    return float(longitude), float(latitude)
 
 
 def _local(origin: Sequence[float]) -> Transformer:
@@ -170,16 +205,19 @@ def _local(origin: Sequence[float]) -> Transformer:
 
 
 def moved(origin: Sequence[float], offset_m: Sequence[float]) -> list[float]:
-    """Return the place (longitude, latitude; degrees) that lies offset_m (2,), east and north, of
-    an origin.
+    """Return the place (longitude, latitude; degrees) that lies beside an origin.
+
+    offset_m: (2,), east and north.
     """
-    there = _local(origin).transform(*offset_m, direction="INVERSE")
+    east_m, north_m = offset_m
+    there = _local(origin).transform(east_m, north_m, direction="INVERSE")
     return [round(float(value), 7) for value in there]
 
 
 def _united(outline: Polygon | MultiPolygon) -> Polygon | MultiPolygon | None:
-    """The outline (m) of a building whose polygons may adjoin or overlap, None where one of them
-    crosses itself.
+    """The outline (m) of a building whose polygons may adjoin or overlap.
+
+    It is None where one of them crosses itself.
     """
     if outline.is_valid:
         return outline
@@ -190,7 +228,10 @@ def _united(outline: Polygon | MultiPolygon) -> Polygon | MultiPolygon | None:
 
 
 def _without_replaced(footprints: list[Footprint]) -> list[Footprint]:
-    """The footprints without outlines in which a building:part lies. Source: Simple 3D Buildings."""
+    """The footprints but outlines in which a building:part lies.
+
+    Source: Simple 3D Buildings.
+    """
     points = []
     for footprint in footprints:
         if is_part(footprint.properties):
@@ -230,7 +271,7 @@ def _heights(
     """
     result = []
     missing = []
-    unread = []
+    unread: list[str] = []
     for footprint in footprints:
         stated = height_of(footprint.properties)
         unread += stated.unread
@@ -242,8 +283,8 @@ def _heights(
     if missing:
         raise InputError(
             f"{path}: {len(missing)} of {len(footprints)} buildings have neither height nor "
-            f"building:levels that can be read, the first is {missing[0]}; "
-            "expected their height: --height, or effects.town.height_m of a scene"
+            f"building:levels that can be read, the first is {missing[0]}; expected their height: "
+            "--height, or effects.town.height_m of a scene"
         )
     if unread:
         which = f"heights that cannot be read{such_as(unread)}"
@@ -287,7 +328,7 @@ def read_footprints(path: Path, origin: tuple[float, float] | None, settings: di
     heights = _heights(path, standing, settings["height_m"], notes)
     walls = []
     unknown = []
-    unread = []
+    unread: list[str] = []
     for (outline, properties, _), height in zip(standing, heights, strict=True):
         stated = low_of(properties)
         low = stated.metres or 0.0

@@ -21,8 +21,9 @@ REACHED = 0
 NOT_BETWEEN = 1
 WRONG_SIDE = 5
 OUTSIDE = 9
-"""What `trace_ray` returns: there is a ray; else the first condition that fails. To NOT_BETWEEN and
-WRONG_SIDE it adds the facet's index in the route.
+"""What `trace_ray` returns: there is a ray; else the first condition that fails.
+
+To NOT_BETWEEN and WRONG_SIDE it adds the facet's index in the route.
 """
 
 
@@ -133,8 +134,9 @@ def crosses(t, start, end):
 
 @INLINED
 def trace_ray(facets, route, station, target, ray, clip):
-    """Fill `ray` with the points of the ray from a station to a target (3,) by the facets of a
-    route (0 to 2,).
+    """Fill `ray` with the points of the ray from a station to a target (3,) by a route.
+
+    route: (0 to 2,), its facets.
 
     clip: whether the ray must meet the facets, not their planes alone. Returns REACHED where there
     is such a ray, else the condition that fails; for each condition, the targets that fail by it

@@ -1,5 +1,6 @@
-"""Paths between a station and a target in a town: direct, past edges, and by one or two facets or
-the ground.
+"""Paths between a station and a target in a town.
+
+They are direct, past edges, and by one or two facets or the ground.
 
 Three steps find the reflected ones. *Candidates*: the routes over facets that may lead to the
 target at all (`candidates`). *Image method*: the rays of each route, every one tested against all
@@ -29,9 +30,11 @@ STEP = 8
 
 
 class Route(NamedTuple):
-    """A path: the facets (0 to 2) from the station on; images (N, L, 3) m, where the station sees
-    the points; coefficient (N, L) complex, 0 where there is no ray; station_m (3,), where the
-    points see the station.
+    """A path.
+
+    facets: (0 to 2), from the station on; images: (N, L, 3) m, where the station sees the points;
+    coefficient: (N, L) complex, 0 where there is no ray; station_m: (3,), where the points see the
+    station.
     """
 
     facets: tuple[int, ...]
@@ -53,8 +56,9 @@ class TracedRays(NamedTuple):
 
 
 def _ends_in_cells(points: np.ndarray, cell_m: float) -> tuple[np.ndarray, np.ndarray]:
-    """One end (R, 3) m in each occupied cell of a grid, and the end (N, L) for each point and symbol
-    of points (N, L, 3) m; STEP symbols share their ends.
+    """Return one end (R, 3) m in each occupied cell of a grid, and the end (N, L) of each point.
+
+    points: (N, L, 3) m; STEP symbols share their ends.
     """
     count = len(points)
     # The middle one of the symbols that share rays.
@@ -73,8 +77,10 @@ def _ends_in_cells(points: np.ndarray, cell_m: float) -> tuple[np.ndarray, np.nd
 
 
 def rays_to(places: np.ndarray, cell_m: float) -> TracedRays:
-    """Return one ray for the points of places (N, L, 3) m that are in one cell of a grid of cell_m
-    (m), STEP symbols sharing them; with cell_m 0 one for each point and symbol.
+    """Return one ray for the points that are in one cell of a grid.
+
+    places: (N, L, 3) m, the points; cell_m: the cell's edge (m), 0 for one ray for each point and
+    symbol; STEP symbols share their rays.
     """
     if cell_m == 0.0:
         ends = places.reshape(-1, 3)
@@ -102,8 +108,9 @@ def epsilons(town: Town, frequency_hz: float, where: str) -> np.ndarray:
 
 
 def _pairs(town: Town, station_m: np.ndarray) -> np.ndarray:
-    """The pairs (P, 2) of facets by which a ray from a station may go on; they hold for all
-    targets.
+    """The pairs (P, 2) of facets by which a ray from a station may go on.
+
+    They hold for all targets.
     """
     key = tuple(station_m.tolist())
     facets = town.facets
@@ -128,8 +135,9 @@ def _unhidden(town: Town, routes: np.ndarray, low: np.ndarray, high: np.ndarray)
 def candidates(
     town: Town, station_m: np.ndarray, places: np.ndarray, order: int
 ) -> list[np.ndarray]:
-    """Return the routes of each of 1 to `order` facets, (P, order) int64, that may lead from a
-    station (3,) m to places (N, L, 3) m.
+    """Return the routes of each of 1 to `order` facets, (P, order) int64.
+
+    They may lead from a station (3,) m to places (N, L, 3) m.
     """
     low = places.min(axis=(0, 1))
     high = places.max(axis=(0, 1))
@@ -146,8 +154,9 @@ def candidates(
 
 
 def seen(town: Town, station_m: np.ndarray, rays: TracedRays, facets: np.ndarray) -> np.ndarray:
-    """Return which points a ray from a station by facets (0 to 2,) reaches past all buildings, (N,
-    L) bool.
+    """Return which points a ray from a station reaches past all buildings, (N, L) bool.
+
+    facets: (0 to 2,), those that reflect it.
     """
     path = shadow_loops.RayPath(town.facets, town.occluders, facets, station_m)
     present = np.zeros((len(rays.places), 1), bool)
@@ -174,8 +183,9 @@ def with_field(
     route: np.ndarray,
     present: np.ndarray,
 ) -> Route:
-    """Return the path by a route (0 to 2,), where it is present (N, L), with images and coefficients;
-    others as in `reflected`.
+    """Return the path by a route (0 to 2,), with images and coefficients.
+
+    present: (N, L), where there is a ray; others as in `reflected`.
     """
     images = np.empty((len(places), 3, places.shape[1]))
     coefficient = np.empty(present.shape, np.complex128)
@@ -196,8 +206,9 @@ def reflected(
     rays: TracedRays,
     order: int,
 ) -> list[Route]:
-    """Return the paths by 1 to `order` reflections that reach any of the points, places (N, L, 3) m
-    C-contiguous.
+    """Return the paths by 1 to `order` reflections that reach any of the points.
+
+    places: (N, L, 3) m, C-contiguous.
 
     epsilon: (K,) complex permittivity of the facets. Source: image method and Fresnel's
     coefficients, Balanis, Advanced Engineering Electromagnetics, sections 5.3 and 7.4.
@@ -217,8 +228,9 @@ def direct(
     wavelength_m: float,
     diffraction: bool,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return where the direct ray is free, (N, L) bool, and its field over that in free space,
-    (N, L) complex.
+    """Return where the direct ray is free, (N, L) bool, and its field, (N, L) complex.
+
+    The field is given over that in free space.
     """
     lit = seen(town, station_m, rays, np.empty(0, np.int64))
     if not diffraction:

@@ -1,16 +1,17 @@
-"""Diffraction of the direct ray over roofs and around vertical edges: knife edges and screens of
-finite width.
+"""Diffraction of the direct ray over roofs and around vertical edges.
+
+Edges are knife edges, and buildings screens of finite width.
 
 A building near or across a ray is a screen with a top and two upright edges, its `Outline`. By
-Babinet's principle the field behind it is 1 - (1 - F(left) - F(right)) (1 - F(top)) of that in free space,
-where F is Fresnel's integral of an edge's parameter nu, which is positive in the shadow: the wave
-passes over the top and around both sides. Of several buildings the one that blocks most counts in
-full, and on each side of it the next one as seen from its edge (Deygout's construction). A choice
-between buildings would make the field jump where a target moves on, so buildings that block nearly
-as much share the weight, and edges near which a ray passes begin to count gradually. The field
-still jumps where a ray enters a gateway, which an outline does not know, and at few places of long
-streets: along 134 m of street in `studies/town/blocks.geojson`, in steps of 1 cm, five times by
-more than 3 % of itself.
+Babinet's principle the field behind it is 1 - (1 - F(left) - F(right)) (1 - F(top)) of that in free
+space, where F is Fresnel's integral of an edge's parameter nu, which is positive in the shadow: the
+wave passes over the top and around both sides. Of several buildings the one that blocks most counts
+in full, and on each side of it the next one as seen from its edge (Deygout's construction). A
+choice between buildings would make the field jump where a target moves on, so buildings that block
+nearly as much share the weight, and edges near which a ray passes begin to count gradually. The
+field still jumps where a ray enters a gateway, which an outline does not know, and at few places of
+long streets: along 134 m of street in `studies/town/blocks.geojson`, in steps of 1 cm, five times
+by more than 3 % of itself.
 """
 
 from typing import NamedTuple
@@ -34,15 +35,16 @@ ALIKE = 0.8
 """Buildings whose nu is more than this share of the way from FREE to the largest nu count with it.
 """
 SURE = 0.1
-"""Where the nu of all edges of a screen lies beyond this, its outline and the traced rays must
-agree.
+"""Where the nu of all edges of a screen lies beyond this, traced rays must agree with its outline.
 """
 
 
 def _shares(nu: np.ndarray) -> np.ndarray:
-    """Weights (B, ...), of sum 1, of B edges or buildings with parameters nu (B, ...): that of the
-    largest nu, and of those that come near it. They change smoothly with nu, and are 0 where
-    another nu is much larger."""
+    """Return weights (B, ...), of sum 1, of B edges or buildings with parameters nu (B, ...).
+
+    The largest nu, and those that come near it, have weights. They change smoothly with nu, and are
+    0 where another nu is much larger.
+    """
     blocking = np.maximum(nu - FREE, 0.0)
     most = blocking.max(axis=0)
     relative = np.divide(blocking, most, out=np.ones_like(blocking), where=most > 0.0)
@@ -51,8 +53,10 @@ def _shares(nu: np.ndarray) -> np.ndarray:
 
 
 class Screen(NamedTuple):
-    """A building near a ray: its outline, the field (...) behind it over that in free space, and
-    the least nu (...) of its edges.
+    """A building near a ray.
+
+    outline: its own; field: (...), that behind it over that in free space; least: (...), the least
+    nu of its edges.
     """
 
     outline: Outline
@@ -63,8 +67,9 @@ class Screen(NamedTuple):
 def behind(
     edges: np.ndarray, start: np.ndarray, ends: np.ndarray, wavelength_m: float
 ) -> Screen | None:
-    """Return the screen that a building's edges (E, 2, 3) m are to rays from start to ends (..., 3)
-    m, None where no ray comes near an edge.
+    """Return the screen that a building is to rays, None where no ray comes near an edge.
+
+    edges: (E, 2, 3) m, the building's; rays go from start to ends (..., 3) m.
     """
     outline = Outline(np.empty((2, 3)), np.empty((2, 3)))
     rays = np.ascontiguousarray(ends).reshape(-1, 3)
@@ -86,8 +91,9 @@ def behind(
 def _next(
     others: list[np.ndarray], start: np.ndarray, ends: np.ndarray, wavelength_m: float
 ) -> np.ndarray | float:
-    """The field (...) behind the building that blocks most on the way from start to ends (..., 3)
-    m.
+    """The field (...) behind the building that blocks most on the way.
+
+    The way goes from start to ends (..., 3) m.
 
     others: the edges (E, 2, 3) m of each building that may.
     """
@@ -106,8 +112,9 @@ def _past(
     lit: np.ndarray,
     wavelength_m: float,
 ) -> np.ndarray:
-    """The direct ray's field (L,) at places (L, 3) m past buildings, each given by its edges (E, 2,
-    3) m; lit: (L,).
+    """The direct ray's field (L,) at places (L, 3) m past buildings.
+
+    Each building is given by its edges (E, 2, 3) m; lit: (L,).
     """
     near = []
     screens = []
@@ -146,8 +153,9 @@ def _past(
 def direct(
     town: Town, station_m: np.ndarray, places: np.ndarray, lit: np.ndarray, wavelength_m: float
 ) -> np.ndarray:
-    """Return the direct ray's field (N, L) at places (N, L, 3) m over that in free space; lit (N,
-    L): what rays say.
+    """Return the direct ray's field (N, L) at places (N, L, 3) m over that in free space.
+
+    lit: (N, L), what rays say.
 
     Source: ITU-R P.526-15, sections 4.1 and 4.3; Babinet's principle: Born & Wolf, Principles of
     Optics, section 8.3.2; several edges: Deygout, IEEE Trans. AP-14, 1966; how those on the sides

@@ -36,8 +36,9 @@ MATERIALS = {
 
 
 def named(text: str) -> str | None:
-    """Return the material that a name such as `mat-itu_concrete` or `Brick.001` means, None for
-    none that is known.
+    """Return the material that a name means, None for none that is known.
+
+    Such names are `mat-itu_concrete` or `Brick.001`.
     """
     plain = text.lower().replace("-", "_").replace(" ", "_")
     held = [name for name in MATERIALS if name in plain]

@@ -11,7 +11,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from lowalt.extensions.town.building_surfaces import Surfaces, joined, mesh_parts
+from lowalt.extensions.town.building_surfaces import Surfaces, joined, mesh_parts, refuse_many
 from lowalt.extensions.town.materials import named
 from lowalt.files.errors import InputError
 from lowalt.targets.mesh_collada import parsed
@@ -34,8 +34,9 @@ def _numbers(element: Element, size: int, default: float) -> np.ndarray:
 
 
 def _pose(shape: Element) -> np.ndarray:
-    """The pose (4, 4) of a shape in the scene; each step of its transform acts after those before
-    it.
+    """The pose (4, 4) of a shape in the scene.
+
+    Each step of its transform acts after those before it.
     """
     result = np.eye(4)
     for transform in shape.findall("transform"):
@@ -55,7 +56,8 @@ def _pose(shape: Element) -> np.ndarray:
                 matrix = _numbers(step, 16, 0.0).reshape(4, 4)
             else:
                 raise InputError(
-                    f"a shape is placed by <{step.tag}>, expected translate, scale, rotate or matrix"
+                    f"a shape is placed by <{step.tag}>, expected translate, scale, rotate or "
+                    "matrix"
                 )
             result = matrix @ result
     return result
@@ -68,8 +70,9 @@ def _names(bsdf: Element) -> list[str]:
 
 
 def _material(shape: Element, scene: dict[str, list[str]]) -> tuple[str, str]:
-    """The material of a shape, "" for none that is known, and the name of one that is not known, ""
-    for none.
+    """The material of a shape, and the name of one that is not known.
+
+    Either is "" for none.
 
     scene: the names of the materials of the scene by their identifiers.
     """
@@ -85,8 +88,9 @@ def _material(shape: Element, scene: dict[str, list[str]]) -> tuple[str, str]:
 
 
 def _file_of(shape: Element, path: Path) -> Path:
-    """The mesh file of a shape. Raises: InputError where it is not in the folder of the scene, or
-    not there.
+    """The mesh file of a shape.
+
+    Raises: InputError where it is not in the folder of the scene, or not there.
     """
     name = ""
     for text in shape.findall("string"):
@@ -107,12 +111,11 @@ def _file_of(shape: Element, path: Path) -> Path:
 
 
 def meshes_of(path: Path) -> list[Path]:
-    """Return the mesh files that a Mitsuba scene names. Raises: InputError as `read_mitsuba`."""
-    return [
-        _file_of(shape, path)
-        for shape in parsed(path).findall("shape")
-        if shape.get("type") in KINDS
-    ]
+    """Return the mesh files that a Mitsuba scene names, each once. Raises: InputError as `read_mitsuba`."""
+    shapes = parsed(path, LARGEST_BYTES).findall("shape")
+    return list(
+        dict.fromkeys(_file_of(shape, path) for shape in shapes if shape.get("type") in KINDS)
+    )
 
 
 def read_mitsuba(path: Path, unit: str) -> Surfaces:
@@ -122,11 +125,7 @@ def read_mitsuba(path: Path, unit: str) -> Surfaces:
     Raises: InputError naming the file: no scene, too large, a mesh outside its folder, or what a
     mesh's reader refuses.
     """
-    if path.stat().st_size > LARGEST_BYTES:
-        raise InputError(
-            f"{path}: over {LARGEST_BYTES >> 20} MiB, expected a scene whose meshes are files"
-        )
-    root = parsed(path)
+    root = parsed(path, LARGEST_BYTES)
     shapes = root.findall("shape")
     if root.tag != "scene" or len(shapes) > MOST_SHAPES:
         raise InputError(
@@ -134,8 +133,11 @@ def read_mitsuba(path: Path, unit: str) -> Surfaces:
             f"{MOST_SHAPES}"
         )
     materials = {bsdf.get("id", ""): _names(bsdf) for bsdf in root.findall("bsdf")}
+    # A scene may name one mesh many times.
+    read: dict[Path, list[tuple[np.ndarray, str]]] = {}
+    count = 0
     walls = []
-    left_out = {}
+    left_out: dict[str, int] = {}
     unknown = []
     for shape in shapes:
         if shape.get("type") not in KINDS:
@@ -146,7 +148,11 @@ def read_mitsuba(path: Path, unit: str) -> Surfaces:
         if unknown_name:
             unknown.append(unknown_name)
         pose = _pose(shape)
-        pieces, _ = mesh_parts(_file_of(shape, path), unit, "z")
-        for corners, _ in pieces:
+        file = _file_of(shape, path)
+        if file not in read:
+            read[file] = mesh_parts(file, unit, "z")[0]
+        for corners, _ in read[file]:
+            count += len(corners)
+            refuse_many(path, count)
             walls.append((corners @ pose[:3, :3].T + pose[:3, 3], material))
     return joined(walls, left_out, {}, unknown)

@@ -1,4 +1,7 @@
-"""`lowalt scene inspect | new`: from a file of buildings to a picture of the town and an overlay."""
+"""`lowalt scene inspect | new`: a picture of a town, and an overlay of a scene in it.
+
+Both are made from a file of buildings.
+"""
 
 import argparse
 from pathlib import Path
@@ -46,8 +49,8 @@ def add_to(commands: argparse._SubParsersAction, name: str) -> None:
             type=float,
             nargs=2,
             metavar=("X", "Y"),
-            help="place in the file of x = y = 0: metres, in GeoJSON longitude and latitude (degrees); "
-            "by default the middle of the town is that of the stations",
+            help="place in the file of x = y = 0: metres, in GeoJSON longitude and latitude "
+            "(degrees); by default the middle of the town is that of the stations",
         )
         line.add_argument("--unit", help="unit of a mesh: m (default), cm, mm, in, ft")
         line.add_argument("--up", choices=("z", "y"), help="axis of a mesh that is up (default: z)")
@@ -67,8 +70,9 @@ def add_to(commands: argparse._SubParsersAction, name: str) -> None:
 
 
 def _settings(options: argparse.Namespace, middle: np.ndarray) -> dict:
-    """The settings of the effect `town` by the options; middle: (2,) m, where the town's middle
-    goes by default.
+    """The settings of the effect `town` by the options.
+
+    middle: (2,) m, where the town's middle goes by default.
     """
     from lowalt.extensions.town import town
     from lowalt.extensions.town.buildings import read
@@ -94,16 +98,16 @@ def _settings(options: argparse.Namespace, middle: np.ndarray) -> dict:
     if options.file.suffix.lower() in (".geojson", ".json"):
         from lowalt.extensions.town.footprints import middle_of, moved
 
-        return given | {"origin": moved(middle_of(options.file, options.height), -middle)}
+        return given | {
+            "origin": moved(middle_of(options.file, options.height), (-middle).tolist())
+        }
     facts = read(town.DEFAULTS | given).facts
     centre = (np.array(facts["low_m"]) + facts["high_m"])[:2] / 2
     return given | {"origin": np.round(centre - middle, 1).tolist()}
 
 
 def _examined(options: argparse.Namespace, picture: Path) -> tuple[dict, dict, list[str]]:
-    """Draw the plan; return the settings of the effect, the facts about the town, and lines that
-    say them.
-    """
+    """Draw the plan; return the effect's settings, facts about the town, and lines of text."""
     from lowalt.config.layers import overlaid
     from lowalt.config.network import Network, masts_m
     from lowalt.extensions.town import town, town_plan
@@ -134,8 +138,9 @@ def _inspect(options: argparse.Namespace) -> Answer:
 
 
 def _new(options: argparse.Namespace) -> Answer:
-    """Draft an overlay. Raises: InputError naming the file and what is wrong with it, or an overlay
-    that exists.
+    """Draft an overlay.
+
+    Raises: InputError naming the file and what is wrong with it, or an overlay that exists.
     """
     from lowalt.extensions.town import town_plan
     from lowalt.files.atomic import slug, write_file

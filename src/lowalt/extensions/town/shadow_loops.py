@@ -43,8 +43,9 @@ MOST_WAITING = 64
 NO_RAY = 0
 BOUNDED = 1
 UNBOUNDED = 2
-"""What `_bounds` returns: no ray reaches the box; the rays to its corners bound all others; they do
-not.
+"""What `_bounds` returns.
+
+No ray reaches the box; the rays to its corners bound all others; they do not.
 """
 DARK = -1
 """What `_shadow_lists` returns where no ray passes."""
@@ -53,8 +54,10 @@ NO_PARENT = -1
 
 
 class RayPath(NamedTuple):
-    """A path to look for: the town's facets and occluders, the facets of its route from the station
-    on (0 to 2,), and the station (3,) m.
+    """A path to look for.
+
+    facets, occluders: of the town; route: (0 to 2,), the facets from the station on; station: (3,)
+    m.
     """
 
     facets: Facets
@@ -64,8 +67,10 @@ class RayPath(NamedTuple):
 
 
 class ShadowLists(NamedTuple):
-    """The triangles that can be in the way of a group of blocks, by the depth of halving and by
-    leg: rows (D, 3, F) of the occluders' triangles, of which the first counts (D, 3) are valid.
+    """The triangles that can be in the way of a group of blocks.
+
+    Triangles are held by the depth of halving and by leg. rows: (D, 3, F), of the occluders'
+    triangles, of which the first counts (D, 3) are valid.
     """
 
     rows: np.ndarray
@@ -73,8 +78,10 @@ class ShadowLists(NamedTuple):
 
 
 class Waiting(NamedTuple):
-    """The stack of groups of blocks that are not traced yet, each (64,): blocks begin to end, how
-    often they were halved, and the depth of lists that hold all their triangles.
+    """The stack of groups of blocks that are not traced yet, each (64,).
+
+    begin, end: blocks; depth: how often they were halved; parent: depth of the lists that hold all
+    their triangles.
     """
 
     begin: np.ndarray
@@ -134,8 +141,9 @@ def _own(occluders, row, route, leg):
 
 @INNER
 def _shadowed(occluders, points, rows, counts):
-    """Whether a triangle of the lists rows (legs, F) blocks a leg of a ray by its points; that one
-    is tried first next.
+    """Whether a triangle of the lists rows (legs, F) blocks a leg of a ray by its points.
+
+    That triangle is tried first next.
     """
     for leg in range(len(counts)):
         for f in range(counts[leg]):
@@ -266,8 +274,10 @@ def _leg_bundled(facets, route, leg, work):
 
 @INLINED
 def _shadow_lists(path, work, depth, parent):
-    """Fill the lists at a depth with the triangles that can be in the way of a block; return their
-    number, DARK where one convex surface is in the way of all rays, or no ray meets all facets.
+    """Fill the lists at a depth with the triangles that can be in the way of a block.
+
+    Returns their number, or DARK where one convex surface is in the way of all rays, or no ray
+    meets all facets.
 
     parent: the depth of lists that hold them all, or NO_PARENT.
     """
@@ -296,8 +306,9 @@ def _shadow_lists(path, work, depth, parent):
 
 @INLINED
 def _bounds(path, boxes, begin, end, work):
-    """Trace the rays to the corners of the box around blocks `begin` to `end`, and keep their
-    points.
+    """Trace the rays to the corners of the box around blocks, and keep their points.
+
+    The blocks are `begin` to `end`.
 
     Returns NO_RAY, BOUNDED or UNBOUNDED.
     """
@@ -333,9 +344,9 @@ def _bounds(path, boxes, begin, end, work):
 
 @INNER
 def _trace_blocks(path, targets, boxes, block, work, present, first_only):
-    """Set present (R, 1) to True where a ray reaches a target, see `trace`; return whether any does.
+    """Set present (R, 1) to True where a ray reaches a target, as `trace` does.
 
-    first_only: stop at the first target that is reached.
+    Returns whether any ray does. first_only: stop at the first target that is reached.
     """
     waiting = work.waiting
     waiting.begin[0] = 0
@@ -375,8 +386,9 @@ def _trace_blocks(path, targets, boxes, block, work, present, first_only):
 
 @PLAIN
 def trace(path, targets, boxes, block, present):
-    """Set present (R, 1) to True where a ray from the station by the facets of a path reaches a
-    target.
+    """Set present (R, 1) to True where a ray from the station reaches a target.
+
+    It goes by the facets of a path.
 
     targets: (R, 1, 3) m; boxes (C, 2, 3): low and high corners around `block` targets each.
     """
@@ -386,8 +398,9 @@ def trace(path, targets, boxes, block, present):
 
 @PLAIN
 def reaching(facets, occluders, routes, station, targets, boxes, block):
-    """Return which routes (P, 1 or 2), facets from the station on, reach any target, (P,) bool;
-    others as in `trace`.
+    """Return which routes reach any target, (P,) bool; others as in `trace`.
+
+    routes: (P, 1 or 2), facets from the station on.
     """
     work = _workspace(len(occluders.triangles), len(boxes))
     present = np.empty(targets.shape[:2], np.bool_)

@@ -1,5 +1,6 @@
-"""A town: buildings from a file block, reflect and diffract the waves between a station and a
-target.
+"""A town: buildings from a file, which block, reflect and diffract waves.
+
+The waves go between a station and a target.
 
 Every ray of every point is traced past all buildings: the direct one, where it is blocked over
 roofs and around edges, and those by one or two of all walls, roofs and the ground. Out by any path
@@ -23,11 +24,9 @@ from lowalt.scene.view import View
 
 SOURCE = (
     "image method and Fresnel coefficients: Balanis, Advanced Engineering Electromagnetics, "
-    "sections 5.3 and 7.4; "
-    "materials: ITU-R P.2040-3, Table 3; diffraction: ITU-R P.526-15, sections 4.1 and 4.3, and "
-    "Deygout 1966; "
-    "rays per cell of 0.5 m: estimate, below the radius of the first Fresnel zone at 100 m and 4.9 "
-    "GHz"
+    "sections 5.3 and 7.4; materials: ITU-R P.2040-3, Table 3; diffraction: ITU-R P.526-15, "
+    "sections 4.1 and 4.3, and Deygout 1966; rays per cell of 0.5 m: estimate, below the radius of "
+    "the first Fresnel zone at 100 m and 4.9 GHz"
 )
 DEFAULTS = {
     "buildings": None,
@@ -76,13 +75,14 @@ def refuse_place(settings: dict, network: Network) -> None:
     for station in network.stations:
         mast = np.asarray(station.position_m, float)
         masts[station.name] = mast
-        away[station.name] = float(np.linalg.norm((mast - np.clip(mast, low, high))[:2]))
+        nearest_point = np.clip(mast, low, high)
+        away[station.name] = float(np.linalg.norm((mast - nearest_point)[:2]))
     nearest = min(away, key=away.__getitem__)
     if away[nearest] > NEAR_M:
         raise InputError(
-            f"{path}: the nearest building is {away[nearest] / 1000:.1f} km from station {nearest}, "
-            f"expected at most {NEAR_M / 1000:g} km: set effects.town.origin, the place in the "
-            "file of x = y = 0"
+            f"{path}: the nearest building is {away[nearest] / 1000:.1f} km from station "
+            f"{nearest}, expected at most {NEAR_M / 1000:g} km: set effects.town.origin, the place "
+            "in the file of x = y = 0"
         )
     for name, mast in masts.items():
         top = np.array([mast[0], mast[1], high[2] + 1.0])
@@ -96,8 +96,9 @@ def refuse_place(settings: dict, network: Network) -> None:
 
 
 def paths(settings: dict, view: View) -> list[ImagePath]:
-    """Return the reflected paths that reach any point, and the change of the direct one where
-    buildings are near it.
+    """Return the reflected paths that reach any point, and the change of the direct one.
+
+    The direct one changes where buildings are near it.
 
     That change is a path along the direct one whose coefficient is the field there over that in
     free space, less one.
@@ -132,8 +133,9 @@ def files(settings: dict) -> list[str]:
 def record(
     settings: dict, network: Network, row: dict, rng: np.random.Generator
 ) -> dict[str, dict]:
-    """Return the field `paths`: which paths lead to the origin of a target, a row of the motion
-    table, at the first symbol.
+    """Return the field `paths`: which paths lead to a target's origin at the first symbol.
+
+    row: the target's, of the motion table.
 
     `under_roof`: whether a roof is above it; `stations`: by name `direct`, whether the sight is
     free; `field_db`, the direct field over that in free space; and `reflected`, the surfaces of

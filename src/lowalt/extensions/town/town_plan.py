@@ -1,5 +1,6 @@
-"""The plan of a town with stations and the region of the targets, what it is in words, and the
-draft of an overlay.
+"""The plan of a town with stations and the region of the targets, and the draft of an overlay.
+
+The module also says in words what the town is.
 """
 
 from pathlib import Path
@@ -16,8 +17,9 @@ AROUND_M = 100.0
 
 
 def draw(path: Path, found: Buildings, network: Network, region: np.ndarray) -> None:
-    """Write a picture of a town seen from above, with the stations and the region (C, 2) m of the
-    targets.
+    """Write a picture of a town seen from above, with the stations and the targets' region.
+
+    region: (C, 2) m.
     """
     import matplotlib
 
@@ -33,7 +35,7 @@ def draw(path: Path, found: Buildings, network: Network, region: np.ndarray) -> 
     figure, axes = pyplot.subplots(figsize=(8, 7), layout="constrained")
     # Walls are lines from above, roofs are areas.
     faces = PolyCollection(
-        corners[..., :2],
+        list(corners[..., :2]),
         array=corners[..., 2].max(axis=1),
         cmap="viridis",
         edgecolors="face",
@@ -62,7 +64,7 @@ def draw(path: Path, found: Buildings, network: Network, region: np.ndarray) -> 
 
 
 def described(path: Path, found: Buildings) -> list[str]:
-    """Return what a town is, what was left out and what was read otherwise than stated, in lines."""
+    """Return in lines what a town is, what was left out and what was read otherwise than stated."""
     facts = found.facts
     low_x, low_y, _ = facts["low_m"]
     high_x, high_y, top = facts["high_m"]
@@ -71,8 +73,8 @@ def described(path: Path, found: Buildings) -> list[str]:
         f"{path}: {facts['buildings']} buildings, {high_x - low_x:.0f} m x {high_y - low_y:.0f} m, "
         f"up to {top:.1f} m high",
         f"x from {low_x:.1f} to {high_x:.1f} m, y from {low_y:.1f} to {high_y:.1f} m",
-        f"{facts['walls']} walls and {facts['roofs']} roofs, "
-        f"merged from {facts['triangles']} triangles",
+        f"{facts['walls']} walls and {facts['roofs']} roofs, merged from {facts['triangles']} "
+        "triangles",
         f"materials (triangles): {used}; ground: {facts['ground']}",
     ]
     lines += [f"left out: {count} {reason}" for reason, count in facts["dropped"].items()]

@@ -1,3 +1,4 @@
-"""Double-double numbers: constants, arithmetic and sines that give the same bits on every
-processor.
+"""Double-double numbers.
+
+Their constants, arithmetic and sines give the same bits on every processor.
 """

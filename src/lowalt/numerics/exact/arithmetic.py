@@ -1,5 +1,6 @@
-"""Double-double arithmetic for compiled loops: numbers of about 32 digits as pairs (high, low) of
-doubles.
+"""Double-double arithmetic for compiled loops.
+
+A number of about 32 digits is a pair (high, low) of doubles.
 
 All operations, including fused multiply-add, are specified by IEEE 754 and must not be reordered,
 so results have the same bits on every processor. A processor without fused multiply-add uses the C

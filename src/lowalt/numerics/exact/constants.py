@@ -1,5 +1,6 @@
-"""Constants as double-doubles, from exact fractions and long decimals: pi, sines and Taylor
-coefficients.
+"""Constants as double-doubles, from exact fractions and long decimals.
+
+They are pi, sines and Taylor coefficients.
 """
 
 from decimal import Decimal, localcontext
@@ -31,15 +32,21 @@ def sine_cosine(angle_rad: float) -> tuple[Fraction, Fraction]:
         x = decimal_of(angle_rad)
         term = Decimal(1)
         sums = [Decimal(0), Decimal(0)]
+        # Even orders belong to the cosine, odd ones to the sine; signs are +, +, -, -.
         for order in range(400):
-            sums[order % 2] += term if order % 4 < 2 else -term
+            if order % 4 < 2:
+                sums[order % 2] += term
+            else:
+                sums[order % 2] -= term
             term *= x / (order + 1)
-        return Fraction(sums[1]), Fraction(sums[0])
+        cosine, sine = sums
+        return Fraction(sine), Fraction(cosine)
 
 
 def taylor(first: int, factor: int, count: int) -> tuple[Pair, ...]:
-    """Return the first `count` coefficients, in x^2, of sin(factor pi x) / x (first = 1) or
-    cos(factor pi x) (0).
+    """Return the first `count` Taylor coefficients, in x^2, of a sine over x or of a cosine.
+
+    first: 1 for sin(factor pi x) / x, 0 for cos(factor pi x).
     """
     with localcontext() as context:
         context.prec = DIGITS

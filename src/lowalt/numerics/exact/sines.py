@@ -12,8 +12,9 @@ from lowalt.numerics.exact.constants import taylor
 
 
 def _split(first: int, factor: int, exact: int, count: int) -> tuple[tuple, tuple, tuple]:
-    """Return Taylor coefficients in reverse: (high, low) of the first `exact`, and the others as
-    doubles.
+    """Return Taylor coefficients in reverse.
+
+    They are (high, low) of the first `exact`, and the others as doubles.
     """
     coefficients = taylor(first, factor, count)[::-1]
     high, low = zip(*coefficients[count - exact :], strict=True)
@@ -30,8 +31,9 @@ COSINE_HIGH, COSINE_LOW, COSINE_REST = _split(0, 2, 5, 11)
 
 @INLINED
 def series(x, high, low, rest):
-    """Return a sum of powers of the double-double x: the lowest orders in double-double, the others
-    in double.
+    """Return a sum of powers of the double-double x.
+
+    The lowest orders are in double-double, the others in double.
     """
     total = rest[0]
     for k in range(1, len(rest)):
@@ -67,14 +69,17 @@ def sine_cosine(x):
     s = multiply(f, series(square, SINE_HIGH, SINE_LOW, SINE_REST))
     c = series(square, COSINE_HIGH, COSINE_LOW, COSINE_REST)
     q = quarter - 4.0 * np.floor(0.25 * quarter)
-    odd = q == 1.0 or q == 3.0
-    sign_s = -1.0 if q >= 2.0 else 1.0
-    sign_c = -1.0 if q == 1.0 or q == 2.0 else 1.0
-    s0 = c[0] if odd else s[0]
-    s1 = c[1] if odd else s[1]
-    c0 = s[0] if odd else c[0]
-    c1 = s[1] if odd else c[1]
-    return (sign_s * s0, sign_s * s1), (sign_c * c0, sign_c * c1)
+    # q quarter turns, 0 to 3: an odd number swaps sine and cosine.
+    swapped = q == 1.0 or q == 3.0
+    below = q >= 2.0
+    left = q == 1.0 or q == 2.0
+    sine = c if swapped else s
+    cosine = s if swapped else c
+    if below:
+        sine = (-sine[0], -sine[1])
+    if left:
+        cosine = (-cosine[0], -cosine[1])
+    return sine, cosine
 
 
 @INLINED
@@ -92,10 +97,16 @@ def dirichlet(x, count):
     """
     f, whole = fraction(x)
     top, turns = fraction(scale(f, count))
-    zero = f[0] == 0.0
+    sign = odd_sign(turns)
+    even_count = count - 2.0 * np.floor(0.5 * count) == 0.0
+    if even_count:
+        sign *= odd_sign(whole)
+    # Both cases are computed, so that the compiler can vectorise loops over points.
+    whole_x = f[0] == 0.0
     below = sine_half(f)
-    ratio = divide(sine_half(top), (1.0 if zero else below[0], below[1]))
-    sign = odd_sign(turns) * (
-        odd_sign(whole) if count - 2.0 * np.floor(0.5 * count) == 0.0 else 1.0
-    )
-    return sign * (count if zero else ratio[0]), sign * (0.0 if zero else ratio[1])
+    divisor = 1.0 if whole_x else below[0]
+    high, low = divide(sine_half(top), (divisor, below[1]))
+    if whole_x:
+        high = count
+        low = 0.0
+    return sign * high, sign * low

@@ -108,7 +108,7 @@ def confusion(counts: dict, categories: tuple[str, ...], narrow: bool = False) -
             answers = [cells.get((true, guess), 0) for guess in categories]
             total = sum(answers)
             totals.append(total)
-            shares.append([100 * answer / total if total else 0.0 for answer in answers])
+            shares.append([100 * answer / max(total, 1) for answer in answers])
         panel.pcolormesh(shares, cmap="Blues", vmin=0, vmax=100, edgecolors="white")
         for line, (true, total) in enumerate(zip(categories, totals, strict=True)):
             for column, guess in enumerate(categories):

@@ -32,8 +32,9 @@ STORED = 2.0**-24
 
 
 def _rows(rows: list[dict[str, str]]) -> list[dict]:
-    """The trained rows of accuracy_cost.csv as numbers, sorted by time; the first row of the table
-    is the default.
+    """The trained rows of accuracy_cost.csv as numbers, sorted by time.
+
+    The first row of the table is the default.
     """
     base = next(row for row in rows if row["kind"] == "trained")
     first = float(base["unseen_percent"])

@@ -38,8 +38,9 @@ COLOURS = [
 
 
 def plain(panels: np.ndarray) -> list[Axes]:
-    """Return the panels of a plot as a list, in a look for light and dark pages: grey lines and a
-    faint grid.
+    """Return the panels of a plot as a list, with grey lines and a faint grid.
+
+    They suit light and dark pages.
     """
     for panel in panels.flat:
         panel.patch.set_visible(False)
@@ -51,8 +52,9 @@ def plain(panels: np.ndarray) -> list[Axes]:
 
 
 def png(figure: Figure, colours: int = 0) -> bytes:
-    """Return the figure as PNG bytes and close it; no dates inside, so equal figures are equal
-    bytes.
+    """Return the figure as PNG bytes and close it.
+
+    No dates are inside, so equal figures are equal bytes.
 
     colours: largest number of colours (0: no limit); a limit halves the bytes of figures full of
     spectra.

@@ -1,6 +1,4 @@
-"""Pictures of one target: points by part with hinges, axes and normals, motion over a cycle, the
-three spectra.
-"""
+"""Pictures of one target: its points with hinges and axes, its motion over a cycle, its spectra."""
 
 from pathlib import Path
 
@@ -24,10 +22,14 @@ from lowalt.targets.gallery import bones
 
 DIRECTIONS = (("from above", 0, 1), ("from the right", 1, 2), ("from behind", 0, 2))
 AXES = ("right x (m)", "front y (m)", "up z (m)")
+FRONT = 1
+"""Number of the axis that points to the front."""
 NORMALS = 150
 """Normals drawn at most: more would hide the points."""
 STEPS = 48
 """Steps of a cycle at which the paths of tips are drawn; a multiple of eight."""
+GREY = (0.55, 0.55, 0.58, 1.0)
+"""Colour of the body, RGBA."""
 FLOOR_DB = -40.0
 CONFIG = SHIPPED / "config/default.yaml"
 
@@ -35,11 +37,10 @@ CONFIG = SHIPPED / "config/default.yaml"
 def _colours(cloud: Cloud) -> np.ndarray:
     """RGBA colour of each point (L, 4), by its part."""
     table = plt.get_cmap("tab20")
-    parts = [
-        (0.55, 0.55, 0.58, 1.0) if kind == "body" else table(i % 20)
-        for i, kind in enumerate(cloud.kinds)
-    ]
-    return np.array(parts)[cloud.part]
+    colours = []
+    for number, kind in enumerate(cloud.kinds):
+        colours.append(GREY if kind == "body" else table(number % 20))
+    return np.array(colours)[cloud.part]
 
 
 def _limits(points: np.ndarray) -> tuple[np.ndarray, float]:
@@ -56,8 +57,10 @@ def draw_view(
     middle: np.ndarray,
     half: float,
 ) -> None:
-    """Draw points (L, 3) m and the bones between them as seen along one axis, one of DIRECTIONS, in
-    a square around `middle` (3,) m of half width `half` (m).
+    """Draw points (L, 3) m and the bones between them as seen along one axis.
+
+    view: one of DIRECTIONS; middle, half: centre (3,) m of the square that is shown, and half its
+    width (m).
     """
     title, across, up = view
     panel.scatter(points[:, across], points[:, up], s=6, c=_colours(cloud), linewidths=0)
@@ -78,12 +81,10 @@ def _marks(
 ) -> None:
     """Hinges with their axes, some normals, and an arrow to the front where the view shows it."""
     _, across, up = view
-    known = np.flatnonzero(np.isfinite(cloud.normals).all(axis=1))
-    some = (
-        known[np.linspace(0, len(known) - 1, min(NORMALS, len(known))).round().astype(int)]
-        if len(known)
-        else known
-    )
+    some = np.flatnonzero(np.isfinite(cloud.normals).all(axis=1))
+    if len(some):
+        evenly = np.linspace(0, len(some) - 1, min(NORMALS, len(some)))
+        some = some[evenly.round().astype(int)]
     tips = cloud.points[some] + 0.05 * half * cloud.normals[some]
     ends = np.stack([cloud.points[some], tips])
     panel.plot(ends[..., across], ends[..., up], color="0.75", linewidth=0.5, zorder=0)
@@ -92,15 +93,20 @@ def _marks(
             ends = np.stack([hinge - 0.12 * half * axis, hinge + 0.12 * half * axis])
             panel.plot(ends[:, across], ends[:, up], color="black", linewidth=0.9)
             panel.plot(hinge[across], hinge[up], "k.", markersize=4)
-    if 1 in (across, up):
-        start = np.array([middle[across], middle[up]]) - (
-            0.9 * half if across != 1 else 0
-        ) * np.array([1, 0])
-        step = 0.8 * half * (np.array([0, 1]) if up == 1 else np.array([1, 0]))
-        start = start - (step / 2 if up == 1 else np.array([0.4 * half, 0.92 * half]))
+    centre = np.array([middle[across], middle[up]])
+    arrow = None
+    if up == FRONT:
+        # The arrow points up, beside the left edge.
+        arrow = np.array([0, 0.8 * half])
+        start = centre - np.array([0.9 * half, 0]) - arrow / 2
+    elif across == FRONT:
+        # The arrow points right, above the lower edge.
+        arrow = np.array([0.8 * half, 0])
+        start = centre - np.array([0.4 * half, 0.92 * half])
+    if arrow is not None:
         panel.annotate(
             "front",
-            xy=start + step,
+            xy=start + arrow,
             xytext=start,
             color="tab:red",
             fontsize=8,
@@ -147,11 +153,14 @@ def _spectra(panels, cloud: Cloud, row: dict, config: dict) -> None:
         if isinstance(kind, OfCells):
             continue
         values = kind.definition(signal, windows, name, *of_station)
-        values = values if kind.SIGNED else _decibel(values)
-        scale = {"vmin": FLOOR_DB, "vmax": 0.0, "cmap": "viridis"}
         if kind.SIGNED:
+            label = "signed power"
             top = float(abs(values).max()) or 1.0
             scale = {"vmin": -top, "vmax": top, "cmap": "RdBu_r"}
+        else:
+            label = "dB"
+            values = _decibel(values)
+            scale = {"vmin": FLOOR_DB, "vmax": 0.0, "cmap": "viridis"}
         extent = *times_s(windows, network), *kind.speeds(windows, network, station)
         picture = panel.imshow(
             values, origin="lower", aspect="auto", extent=extent, interpolation="nearest", **scale
@@ -162,15 +171,15 @@ def _spectra(panels, cloud: Cloud, row: dict, config: dict) -> None:
             ylabel="radial speed (m/s)\nreceding upwards, folded",
         )
         panel.set_ylim(sorted(extent[2:]))
-        panel.figure.colorbar(
-            picture, ax=panel, label="signed power" if kind.SIGNED else "dB", fraction=0.05
-        )
+        panel.figure.colorbar(picture, ax=panel, label=label, fraction=0.05)
 
 
 def most_moved(cloud: Cloud, frames: np.ndarray) -> np.ndarray:
-    """Return the numbers of the points whose paths are drawn, of frames (T, L, 3) m: the point of
-    each moving part that travels farthest, or the four nodes of a recording that do. Empty where
-    nothing moves."""
+    """Return the numbers of the points whose paths are drawn.
+
+    frames: (T, L, 3) m. They are the point of each moving part that travels farthest, or the four
+    nodes of a recording that do; none where nothing moves.
+    """
     travelled = np.linalg.norm(np.diff(frames, axis=0), axis=2).sum(axis=0)
     if len(cloud.track):
         return np.argsort(-travelled, kind="stable")[:4]
@@ -183,8 +192,7 @@ def most_moved(cloud: Cloud, frames: np.ndarray) -> np.ndarray:
 
 
 def _instants(panels, cloud: Cloud, row: dict) -> None:
-    """The target at four instants of a cycle, and the paths of the tips of its moving parts over
-    the whole cycle.
+    """The target at four instants of a cycle, with the paths of the tips of its moving parts.
 
     A part that turns is seen along its axis, wings from behind, and a recording from the right.
     """
@@ -201,10 +209,12 @@ def _instants(panels, cloud: Cloud, row: dict) -> None:
     view = {2: DIRECTIONS[0], 0: DIRECTIONS[1], 1: DIRECTIONS[2]}[int(along.argmax())]
     _, across, up = view
     middle, half = _limits(frames)
-    for panel, step in zip(panels, (np.arange(len(panels)) * STEPS) // len(panels), strict=True):
+    steps = (np.arange(len(panels)) * STEPS) // len(panels)
+    if "rotor" in cloud.kinds or "wheel" in cloud.kinds:
         # Two blades look the same after half a turn, so an eighth of the cycle is added in each
         # panel.
-        step = int(step / 2) if "rotor" in cloud.kinds or "wheel" in cloud.kinds else int(step)
+        steps = steps // 2
+    for panel, step in zip(panels, steps.tolist(), strict=True):
         draw_view(panel, cloud, frames[step], view, middle, half)
         panel.plot(frames[:, tips, across], frames[:, tips, up], color="tab:red", linewidth=0.7)
         panel.plot(
@@ -214,8 +224,10 @@ def _instants(panels, cloud: Cloud, row: dict) -> None:
 
 
 def target_picture(cloud: Cloud, config_path: Path = CONFIG, seed: int = 1) -> bytes:
-    """Return a PNG of a cloud: three views in metres with hinges, axes and normals, the target at
-    four instants of a cycle with the paths of its tips, and one motion model's spectra.
+    """Return a PNG of a cloud: three views, the target at four instants, and spectra.
+
+    Views are in metres with hinges, axes and normals; the instants are of a cycle, with the paths
+    of tips; the spectra are of one motion model.
 
     The motion model is drawn as the workflow draws them, for the network of the configuration.
     Raises: InputError where there is no such configuration, or the target's motion cannot be drawn.

@@ -1,6 +1,4 @@
-"""One sample as a picture with axes, a row for each station, a column for each spectrum; and
-samples of each class.
-"""
+"""One sample as a picture with axes, a row per station, a column per spectrum; and examples."""
 
 from typing import NamedTuple
 
@@ -16,8 +14,9 @@ from lowalt.tiles.render import Renderer, split
 
 
 class Axes(NamedTuple):
-    """The scales of an image: name, first and last value of its columns, and of its rows from
-    below.
+    """The scales of an image: name, first and last value of its columns, and of its rows.
+
+    Rows are counted from below.
     """
 
     across: tuple[str, float, float]
@@ -33,8 +32,9 @@ def times_s(settings: Fourier | Transfer, network: Network) -> tuple[float, floa
 
 
 def axes_of(name: str, station: Station, renderer: Renderer) -> Axes:
-    """Return the axes of the images of one spectrum at one station; a tile has a spectrum's first
-    row at the bottom.
+    """Return the axes of the images of one spectrum at one station.
+
+    A tile has a spectrum's first row at the bottom.
     """
     settings = renderer.spectra[name]
     network = renderer.network
@@ -49,8 +49,7 @@ def axes_of(name: str, station: Station, renderer: Renderer) -> Axes:
 
 
 def figure(tile: np.ndarray, renderer: Renderer, title: str) -> bytes:
-    """Return the picture (PNG bytes) of a tile of index values (rows, columns) uint8, with time and
-    speed on its axes.
+    """Return the picture (PNG bytes) of a tile of index values (rows, columns) uint8, with axes.
 
     Where a spectrum's top row approaches, its image is turned over, so that receding is upwards
     everywhere. Speeds beyond the largest that a spectrum shows fold back into it: the phase then
@@ -79,33 +78,38 @@ def figure(tile: np.ndarray, renderer: Renderer, title: str) -> bytes:
             extent=(*axes.across[1:], *axes.upwards[1:]),
         )
         panel.set_ylim(sorted(axes.upwards[1:]))
-        cells = isinstance(spectrum(name), OfCells)
-        folds = "" if cells else f"folds beyond {max(map(abs, axes.upwards[1:])):.1f} m/s"
-        panel.set_title(f"{station.name}: {spectrum(name).TITLE}\n{folds}", fontsize=8)
-        panel.set_ylabel(axes.upwards[0] if cells or not column else "", fontsize=8)
-        panel.set_xlabel(axes.across[0] if cells or row == shape[0] - 1 else "", fontsize=8)
+        own_axes = isinstance(spectrum(name), OfCells)
+        title = f"{station.name}: {spectrum(name).TITLE}\n"
+        if not own_axes:
+            title += f"folds beyond {max(map(abs, axes.upwards[1:])):.1f} m/s"
+        panel.set_title(title, fontsize=8)
+        if own_axes or column == 0:
+            panel.set_ylabel(axes.upwards[0], fontsize=8)
+        if own_axes or row == shape[0] - 1:
+            panel.set_xlabel(axes.across[0], fontsize=8)
         panel.tick_params(labelsize=7)
         panel.locator_params(axis="x", nbins=6)
     return png(drawn)
 
 
 def example_tiles(shards: ShardSet) -> list[tuple[str, bytes]]:
-    """Return (caption, PNG bytes) of the sample of highest SNR of each category's first motion
-    model in the set.
+    """Return (caption, PNG bytes) of one sample of each category.
+
+    It is the one of highest SNR of the category's first motion model in the set.
     """
     chosen = []
     for label, category in enumerate(shards.classes):
         numbers = np.flatnonzero(shards.labels == label)
         if len(numbers):
-            best = numbers[np.lexsort((shards.keys[numbers], -shards.snrs_db[numbers]))[0]]
-            record = shards.record(int(best))
-            noise = (
-                "no noise" if np.isinf(shards.snrs_db[best]) else f"SNR {shards.snrs_db[best]:g} dB"
-            )
+            order = np.lexsort((shards.keys[numbers], -shards.snrs_db[numbers]))
+            best = int(numbers[order[0]])
+            record = shards.record(best)
+            snr_db = shards.snrs_db[best]
+            noise = "no noise" if np.isinf(snr_db) else f"SNR {snr_db:g} dB"
             caption = f"{category}: {record['subtype']}, motion model {record['model']}, {noise}"
-            stored = shards.kind == "image"
-            picture = (
-                shards.png(int(best)) if stored else encode(shards.tile(int(best)), shards.palette)
-            )
+            if shards.kind == "image":
+                picture = shards.png(best)
+            else:
+                picture = encode(shards.tile(best), shards.palette)
             chosen.append((caption, picture))
     return chosen

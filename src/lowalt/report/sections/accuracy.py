@@ -30,11 +30,9 @@ def values(run: ReportedRun) -> dict:
     """Return accuracies of this run and of the paper, their figure, and the network in words."""
     measured = run.inputs.table("accuracy", *COLUMNS, "seeds", "spread_points")
     ours = by_scheme(measured)
-    paper = (
-        by_scheme(read_csv(run.inputs.path("published"), *COLUMNS))
-        if "published" in run.inputs
-        else {}
-    )
+    paper = {}
+    if "published" in run.inputs:
+        paper = by_scheme(read_csv(run.inputs.path("published"), *COLUMNS))
     return {
         "classes": len(run.shards.classes),
         "ours": ours,

@@ -1,6 +1,4 @@
-"""Section: which scheme is better than which, paired on the same samples, and whether the paper's
-orderings hold.
-"""
+"""Section: paired comparisons of schemes, and whether the paper's orderings hold."""
 
 from lowalt.report.reported_run import ReportedRun
 
@@ -37,13 +35,15 @@ def ordering_words(rows: list[dict[str, str]]) -> str:
             for row in rows
             if row["ordering"] == verdict
         ]
-        words += f"; {phrase}: {', '.join(names)}" if names else ""
+        if names:
+            words += f"; {phrase}: {', '.join(names)}"
     return words + "."
 
 
 def values(run: ReportedRun) -> dict | None:
-    """Return the paired comparisons and the paper's orderings; None where no two compared schemes
-    were trained.
+    """Return the paired comparisons and the paper's orderings.
+
+    It is None where no two compared schemes were trained.
     """
     comparisons = run.inputs.table("comparisons", *COMPARISONS)
     orderings = run.inputs.table("orderings", *ORDERINGS)

@@ -10,8 +10,9 @@ COLUMNS = ("protocol", "scheme", "snr_db", "category", "predicted", "samples")
 
 
 def values(run: ReportedRun) -> dict | None:
-    """Return both plots, that by SNR of the best scheme of each protocol; None where nothing was
-    predicted.
+    """Return both plots, None where nothing was predicted.
+
+    That by SNR is of the best scheme of each protocol.
     """
     rows = run.inputs.table("confusion_by_snr", *COLUMNS)
     classes = run.shards.classes

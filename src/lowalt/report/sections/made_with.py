@@ -1,5 +1,6 @@
-"""Section: what made the run: revision, seeds, machines, versions, checksums, configuration, and
-the commands again.
+"""Section: what made the run, and the commands that make it again.
+
+It lists revision, seeds, machines, versions, checksums and configuration.
 """
 
 import platform
@@ -58,9 +59,7 @@ def machines(run: ReportedRun) -> list[tuple[str, str]]:
 
 
 def values(run: ReportedRun) -> dict:
-    """Return the revision, the seeds, machines, versions, checksums, the configuration and the
-    commands again.
-    """
+    """Return the facts on what made the run, and the commands again."""
     commit = revision()
     lines, overlay = commands(commit, changes(load_yaml(shipped(BASE)), as_named(run.config)))
     return {

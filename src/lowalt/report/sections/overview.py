@@ -1,6 +1,4 @@
-"""Section: what the run is, its accuracies beside the paper's in one sentence each, and a tile of
-each category.
-"""
+"""Section: what the run is, its accuracies beside the paper's, and a tile of each category."""
 
 from lowalt.files.csv_tables import read_csv
 from lowalt.machine.hardware import describe
@@ -16,7 +14,7 @@ TILES = 4
 
 
 def verdict(entries: list[dict], classes: int) -> str:
-    """Return sentences that help to judge the entries of `accuracies`, said once for all of them."""
+    """Return sentences that help to judge the entries of `accuracies`, said once for all."""
     words = [f"Chance level is {100 / classes:.0f} %."]
     if any(entry["paper"] is not None for entry in entries):
         words.append("The paper's data are not public, so its figures are not comparable.")
@@ -26,8 +24,10 @@ def verdict(entries: list[dict], classes: int) -> str:
 
 
 def accuracies(rows: list[dict[str, str]], published: list[dict[str, str]]) -> list[dict]:
-    """Return one entry per protocol: scheme of highest average, its accuracy beside the paper's,
-    interval of macro F1, and number of training seeds.
+    """Return one entry per protocol, on its scheme of highest average.
+
+    An entry has the accuracy beside the paper's, the interval of macro F1, and the number of
+    training seeds.
     """
     ours = by_scheme(rows)
     paper = by_scheme(published)
@@ -51,9 +51,9 @@ def accuracies(rows: list[dict[str, str]], published: list[dict[str, str]]) -> l
 
 def values(run: ReportedRun) -> dict:
     """Return the run's size, its accuracies with a verdict, and tiles of its first classes."""
-    published = (
-        read_csv(run.inputs.path("published"), *COLUMNS) if "published" in run.inputs else []
-    )
+    published = []
+    if "published" in run.inputs:
+        published = read_csv(run.inputs.path("published"), *COLUMNS)
     measured = run.inputs.table("accuracy", *COLUMNS, "seeds", "spread_points")
     best = accuracies(measured, published)
     tiles = [(caption, embedded(data)) for caption, data in example_tiles(run.shards)[:TILES]]

@@ -1,6 +1,4 @@
-"""Section: recognition accuracy against computing time, from this run's table or the stored
-reference.
-"""
+"""Section: recognition accuracy against time, from this run's table or the stored reference."""
 
 from lowalt.report.figures import cost_plots
 from lowalt.report.plots import for_every_width
@@ -19,9 +17,7 @@ SHOWN = (
 
 
 def values(run: ReportedRun) -> dict | None:
-    """Return the plot, the presets and all rows; None where neither run nor reference has the
-    table.
-    """
+    """Return the plot, the presets and all rows; None where neither has the table."""
     name = run.inputs.own_or_kept("accuracy_cost")
     if name is None:
         return None

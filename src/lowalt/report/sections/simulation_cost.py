@@ -9,8 +9,9 @@ USUAL = 300
 
 
 def sentence(rows: list[dict[str, str]]) -> str:
-    """Return what a tolerance saves; "" where the exact mode or tolerances were not timed. rows: of
-    cost.csv.
+    """Return what a tolerance saves; "" where the exact mode or tolerances were not timed.
+
+    rows: of cost.csv.
     """
     times: dict[int, dict[str, float]] = {}
     for row in rows:
@@ -30,10 +31,12 @@ def sentence(rows: list[dict[str, str]]) -> str:
         f"Exact costs {exact:.2f} ms per signal of {usual} points, and tolerances save at most "
         f"{saved:.2f} ms of it"
     )
-    of_the_largest = (
-        "" if most == usual else " ({1:.0f} of {0:.0f} ms at {2} points)".format(*pairs[most], most)
-    )
-    return f"{words}{of_the_largest}" + (", so use exact." if saved < exact / 2 else ".")
+    if most != usual:
+        exact_of_most, saved_of_most = pairs[most]
+        words += f" ({saved_of_most:.0f} of {exact_of_most:.0f} ms at {most} points)"
+    if saved < exact / 2:
+        words += ", so use exact"
+    return f"{words}."
 
 
 def values(run: ReportedRun) -> dict | None:

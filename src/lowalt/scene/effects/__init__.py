@@ -26,15 +26,12 @@ LISTED = {
     "transmitter": "slow_time data_symbols power_amplifier comb_pilots",
     "channel": (
         "pointing_error element_pattern mean_cross_section fluctuation cross_sections occlusion "
-        "line_of_sight "
-        "ground_reflection walls reflected_aspect squint wavefront symbol_motion cyclic_prefix "
-        "companions "
-        "direct_path interference clutter background_channel"
+        "line_of_sight ground_reflection walls reflected_aspect squint wavefront symbol_motion "
+        "cyclic_prefix companions direct_path interference clutter background_channel"
     ),
     "receiver": (
         "receiver_noise cell_noise link_offset timing_offset clock_offset carrier_offset "
-        "phase_noise transmit_leakage "
-        "iq_imbalance adc"
+        "phase_noise transmit_leakage iq_imbalance adc"
     ),
     "detection": "canceller detector cell_error",
 }
@@ -46,21 +43,23 @@ ADDED: dict[str, AddedEffect] = offered("effects")
 
 
 def _places() -> dict[str, str]:
-    """The place of every effect: those LISTED, then the others of its folder, and extensions'
-    between.
+    """The place of every effect.
+
+    Effects come in the order of LISTED, then the others of its folder, and extensions' between.
     """
     folder = Path(__file__).parent
-    result = {}
+    result: dict[str, str] = {}
     for place in PLACE_ORDER:
-        files = sorted(
-            path.stem for path in (folder / place).glob("*.py") if path.stem != "__init__"
-        )
-        names = [*dict.fromkeys((*LISTED[place].split(), *files))]
+        files = sorted(path.stem for path in (folder / place).glob("*.py"))
+        names = list(dict.fromkeys((*LISTED[place].split(), *files)))
+        names.remove("__init__")
         for name, added in ADDED.items():
-            if added.place == place:
-                names.insert(
-                    names.index(added.after) + 1 if added.after in names else len(names), name
-                )
+            if added.place != place:
+                continue
+            index = len(names)
+            if added.after in names:
+                index = names.index(added.after) + 1
+            names.insert(index, name)
         result |= dict.fromkeys(names, place)
     return result
 
@@ -80,21 +79,23 @@ class NamedEffect(NamedTuple):
     @property
     def idle(self) -> bool:
         """Whether the settings change nothing."""
-        entries = getattr(self.module, "IDLE", ())
-        return any(
-            all(self.settings[key] == value for key, value in entry.items()) for entry in entries
-        )
+        for entry in getattr(self.module, "IDLE", ()):
+            if all(self.settings[key] == value for key, value in entry.items()):
+                return True
+        return False
 
     @property
     def snr_db(self) -> float | None:
-        """The SNR at which the effect adds noise; None for each of noise.snr_db, and for effects
-        without one.
+        """The SNR at which the effect adds noise.
+
+        It is None for each of noise.snr_db, and for effects without one.
         """
         return self.settings.get(getattr(self.module, "SET_SNR", None))
 
     def offers(self, name: str) -> bool:
-        """Whether the effect has a function of the contract, or sets another of its names to a
-        value other than False.
+        """Whether the effect has a function of the contract, or another of its names set.
+
+        A name counts as set where its value is not False.
         """
         return getattr(self.module, name, False) is not False
 
@@ -105,8 +106,7 @@ class NamedEffect(NamedTuple):
         return {f"effects.{self.name}.{key}": self.settings[key] for key in keys}
 
     def texts(self, function: str) -> list[str]:
-        """Return the texts that a function of the settings gives, none where the effect has no such
-        function.
+        """Return the texts that a function of the settings gives, none without such a function.
 
         Raises: InputError where it gives anything else.
         """
@@ -122,12 +122,15 @@ class NamedEffect(NamedTuple):
     def at_snr(self, snr_db: float) -> "NamedEffect":
         """Return the effect with its noise, if it adds any, at this SNR (dB)."""
         key = getattr(self.module, "SET_SNR", None)
-        return self._replace(settings=self.settings | {key: snr_db}) if key else self
+        if not key:
+            return self
+        return self._replace(settings=self.settings | {key: snr_db})
 
 
 def dotted(name: str) -> str:
-    """Return the module of an effect, such as lowalt.scene.effects.receiver.adc, or the path of the
-    user's own.
+    """Return the module of an effect, such as lowalt.scene.effects.receiver.adc.
+
+    Of the user's own effect it is the path.
 
     Raises: InputError for a name that belongs to no effect.
     """
@@ -136,7 +139,9 @@ def dotted(name: str) -> str:
     if name not in PLACES:
         known = f"{instead([name], sorted(PLACES))}, or the path of an effect's Python file"
         raise InputError(f"effects: unknown effect {name!r}, expected {known}")
-    return ADDED[name].module if name in ADDED else f"{__name__}.{PLACES[name]}.{name}"
+    if name in ADDED:
+        return ADDED[name].module
+    return f"{__name__}.{PLACES[name]}.{name}"
 
 
 def module_of(name: str) -> ModuleType:
@@ -183,8 +188,9 @@ def complete(block: Mapping[str, dict | None]) -> list[NamedEffect]:
 
 
 def called(block: Mapping[str, dict | None]) -> list[NamedEffect]:
-    """Return the effects of a scene's `effects` block in the chain's order, without those that are
-    idle.
+    """Return the effects of a scene's `effects` block in the chain's order.
+
+    Those that are idle are left out.
 
     Raises: InputError for an unknown effect or parameter, or two effects that offer a function of
     which a scene has one (`contract.OFFERS`).
@@ -196,8 +202,9 @@ def called(block: Mapping[str, dict | None]) -> list[NamedEffect]:
 
 
 def named_files(block: Mapping[str, dict | None]) -> dict[str, str]:
-    """Return the paths of files that the settings of a scene's effects hold, by their keys of the
-    configuration.
+    """Return the paths of files that the settings of a scene's effects hold.
+
+    They are given by their keys of the configuration.
     """
     result: dict[str, str] = {}
     for effect in complete(block):
@@ -206,15 +213,18 @@ def named_files(block: Mapping[str, dict | None]) -> dict[str, str]:
 
 
 def effect_files(block: Mapping[str, dict | None]) -> list[str]:
-    """Return the paths of all files that a scene's effects read, those included that such files
-    name.
+    """Return the paths of all files that a scene's effects read.
+
+    Files that such files name are included.
 
     Raises: InputError where a file that names others is not there or cannot be read.
     """
     result: dict[str, None] = {}
     for effect in complete(block):
-        named = effect.named_files.values()
-        result |= dict.fromkeys(effect.texts("files") if effect.offers("files") else named)
+        paths = list(effect.named_files.values())
+        if effect.offers("files"):
+            paths = effect.texts("files")
+        result |= dict.fromkeys(paths)
     return list(result)
 
 
@@ -232,15 +242,17 @@ def needs_surfaces(block: Mapping[str, dict | None]) -> bool:
 
 
 def breaks_tracks(block: Mapping[str, dict | None]) -> list[str]:
-    """Return the names of the effects that draw a motion for each look, so that the looks of a
-    track do not join.
+    """Return the names of the effects that draw a motion for each look.
+
+    The looks of a track then do not join.
     """
     return [effect.name for effect in complete(block) if effect.offers("JUMPS")]
 
 
 def of_record(block: Mapping[str, dict | None]) -> dict[str, dict]:
-    """Return the effects of an `effects` block that add to the record of a sample, with the
-    settings given there.
+    """Return the effects of an `effects` block that add to the record of a sample.
+
+    Each has the settings given there.
     """
     return {
         effect.name: block[effect.name] or {}
@@ -249,7 +261,7 @@ def of_record(block: Mapping[str, dict | None]) -> dict[str, dict]:
     }
 
 
-def look_stream(seed: int, name: str, row: dict, *more: object) -> np.random.Generator:
+def look_stream(seed: int, name: str, row: dict, *more: str | float) -> np.random.Generator:
     """Return the random stream of an effect for the motion model `row`, from its start.
 
     more: what else the draws depend on: stations, an SNR. The stream of a user's own effect has the
@@ -280,15 +292,17 @@ def record_fields(
 
 
 def with_offer(name: str) -> str:
-    """Return the shipped effects that offer a name of the contract, as sentences name a choice of
-    them.
+    """Return the shipped effects that offer a name of the contract.
+
+    They are written as a sentence names a choice.
     """
     return " or ".join(f"effects.{one}" for one in PLACES if hasattr(module_of(one), name))
 
 
 def every(effects: Iterable[NamedEffect], function: str) -> dict[str, Callable[..., Any]]:
-    """Return the functions of this name that effects offer, with their settings, by effect in the
-    order given.
+    """Return the functions of this name that effects offer, with their settings.
+
+    They are given by effect in the order of the effects.
     """
     return {
         effect.name: partial(getattr(effect.module, function), effect.settings)
@@ -298,8 +312,9 @@ def every(effects: Iterable[NamedEffect], function: str) -> dict[str, Callable[.
 
 
 def offering(block: Mapping[str, dict | None], place: str, name: str) -> dict[str, dict]:
-    """Return those of an `effects` block that act at a place and have a function, or another name,
-    of the contract.
+    """Return those of an `effects` block that act at a place and offer a name of the contract.
+
+    The name may be that of a function or another one.
 
     Of shipped effects only those of that place are imported, while a file of the user's own tells
     its place when it is loaded; idle ones are left out.
@@ -314,8 +329,9 @@ def offering(block: Mapping[str, dict | None], place: str, name: str) -> dict[st
 
 
 def only(effects: Iterable[NamedEffect], function: str) -> Callable[..., Any] | None:
-    """Return the function of this name that one of the effects offers, with its settings, None
-    where none does.
+    """Return the function of this name that one of the effects offers, with its settings.
+
+    It is None where none of them offers it.
 
     Raises: InputError where several effects offer a function of which a scene has one.
     """

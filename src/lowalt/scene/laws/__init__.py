@@ -1,3 +1,4 @@
-"""Laws that effects share: fast fading, wind-blown land, flight in wind, linear Gaussian processes,
-clocks.
+"""Laws that effects share.
+
+They are fast fading, wind-blown land, flight in wind, linear Gaussian processes and clocks.
 """

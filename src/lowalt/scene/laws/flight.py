@@ -9,13 +9,10 @@ from lowalt.targets.cloud import Cloud
 
 SOURCE = (
     "masses: makers' 0.249 kg at 0.2192 m (DJI Mini 2) and 620 kg at 5.2704 m (EH216-S), straight "
-    "between in log over "
-    "log size; rotor drag 0.465/s: Faessler, Franchi & Scaramuzza, IEEE Robot. Autom. Lett. 3, "
-    "2018, both axes; "
-    "flat plate of 0.15 L^2: estimate; birds: Rayner, Current Ornithology 5, 1988 (span 1.17 "
-    "m^0.39, wing area 0.16 "
-    "m^0.72), lift to drag 6: Pennycuick, J. Exp. Biol. 49, 1968; slower with the root of the "
-    "length: Froude's scaling"
+    "between in log over log size; rotor drag 0.465/s: Faessler, Franchi & Scaramuzza, IEEE Robot. "
+    "Autom. Lett. 3, 2018, both axes; flat plate of 0.15 L^2: estimate; birds: Rayner, Current "
+    "Ornithology 5, 1988 (span 1.17 m^0.39, wing area 0.16 m^0.72), lift to drag 6: Pennycuick, J. "
+    "Exp. Biol. 49, 1968; slower with the root of the length: Froude's scaling"
 )
 
 AIR_KG_M3 = 1.225
@@ -44,8 +41,8 @@ def length_m(cloud: Cloud) -> float:
     length = float(cloud.record.get("published", {}).get("size_m") or size_m(cloud))
     if length == 0:
         raise InputError(
-            f"{cloud.subtype}: its body is one point and has no size, by which it answers the wind, expected size_m in "
-            "the table of targets"
+            f"{cloud.subtype}: its body is one point and has no size, by which it answers the "
+            "wind, expected size_m in the table of targets"
         )
     return length
 
@@ -60,8 +57,9 @@ def mass_kg(cloud: Cloud) -> float:
 
 
 def response_s(cloud: Cloud, airspeed_mps: float) -> tuple[float, float]:
-    """Return the time constants (s) with which the air carries a target along: horizontally, and
-    vertically.
+    """Return the time constants (s) with which the air carries a target along.
+
+    They are those for horizontal and for vertical motion.
 
     A body's drag, linear in small gusts, accelerates it by rho C_D A V / m times the gust. Rotors
     add theirs. A bird's drag is its weight over its lift-to-drag ratio; vertically its wing's lift

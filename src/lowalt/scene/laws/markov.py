@@ -1,5 +1,6 @@
-"""Linear Gaussian processes driven by white noise, discretised exactly; the motion effects use
-them.
+"""Linear Gaussian processes driven by white noise, discretised exactly.
+
+The motion effects use them.
 
 A process x' = F x + g n with white noise n of unit intensity changes over a step h to
 
@@ -27,8 +28,9 @@ _FORGOTTEN = 1e-12
 
 
 class Steps(NamedTuple):
-    """A process of K states over one step: transition (K, K), and the covariance (K, K) of the
-    noise that it adds.
+    """A process of K states over one step.
+
+    transition: (K, K); added: (K, K), the covariance of the noise that a step adds.
     """
 
     transition: np.ndarray
@@ -49,18 +51,20 @@ def root_of(covariance: np.ndarray) -> np.ndarray:
     # Ones, and no roundings of one: the first pivot is then the same on every processor.
     np.fill_diagonal(left, size > 0)
     for column in range(len(left)):
-        place = int(np.argmax(np.diag(left)))
-        if left[place, place] <= _LEAST:
+        pivot = int(np.argmax(np.diag(left)))
+        if left[pivot, pivot] <= _LEAST:
             break
-        root[:, column] = left[:, place] / np.sqrt(left[place, place])
+        root[:, column] = left[:, pivot] / np.sqrt(left[pivot, pivot])
         left = left - root[:, None, column] * root[None, :, column]
-        left[place], left[:, place] = 0.0, 0.0
+        left[pivot] = 0.0
+        left[:, pivot] = 0.0
     return scale[:, None] * root
 
 
 def exponential(matrix: np.ndarray) -> np.ndarray:
-    """Return the exponential of a matrix (K, K) whose largest column sum of sizes is at most 2, by
-    its series.
+    """Return the exponential of a matrix (K, K) by its series.
+
+    The largest column sum of the sizes of its entries is at most 2.
     """
     unit = np.eye(len(matrix))
     result = unit
@@ -77,31 +81,34 @@ def _twice(process: Steps) -> Steps:
 
 
 def steps(drift: np.ndarray, noise: np.ndarray) -> Steps:
-    """Return the exact discretisation over one unit of time of x' = drift x + noise n; (K, K) and
-    (K,).
+    """Return the exact discretisation over one unit of time of x' = drift x + noise n.
+
+    drift: (K, K); noise: (K,).
 
     Source: Van Loan 1978, "Computing integrals involving the matrix exponential", IEEE Trans.
     Automatic Control 23.
     """
     count = len(drift)
-    # Compute a part of the step so short that its exponentials neither grow nor cancel, then double
-    # it repeatedly.
-    halvings = max(0, int(np.frexp(portable.total(np.abs(drift), axis=0).max())[1]))
+    # Compute a piece of the step so short that its exponentials neither grow nor cancel, then
+    # double it repeatedly.
+    largest = portable.total(np.abs(drift), axis=0).max()
+    halvings = max(0, int(np.frexp(largest)[1]))
     block = np.zeros((2 * count, 2 * count))
     block[:count, :count] = -drift
     block[:count, count:] = noise[:, None] * noise
     block[count:, count:] = drift.T
-    part = exponential(block / 2**halvings)
-    transition = part[count:, count:].T
-    process = Steps(transition, portable.product(transition, part[:count, count:]))
+    short = exponential(block / 2**halvings)
+    transition = short[count:, count:].T
+    process = Steps(transition, portable.product(transition, short[:count, count:]))
     for _ in range(halvings):
         process = _twice(process)
     return Steps(process.transition, 0.5 * (process.added + process.added.T))
 
 
 def stationary(process: Steps) -> np.ndarray:
-    """Return the stationary covariance (K, K) of a stable process: after so many steps, its start
-    is forgotten.
+    """Return the stationary covariance (K, K) of a stable process.
+
+    After so many steps, its start is forgotten.
     """
     while abs(process.transition).max() > _FORGOTTEN:
         process = _twice(process)
@@ -117,9 +124,8 @@ def _walk(transition, root, normal, out):
             for i in range(count):
                 total = 0.0
                 for j in range(count):
-                    total += (
-                        transition[b, i, j] * out[b, n - 1, j] + root[b, i, j] * normal[b, n - 1, j]
-                    )
+                    moved = transition[b, i, j] * out[b, n - 1, j]
+                    total += moved + root[b, i, j] * normal[b, n - 1, j]
                 out[b, n, i] = total
 
 
@@ -128,15 +134,13 @@ def walk(processes: list[Steps], start: np.ndarray, normal: np.ndarray) -> np.nd
     out = np.empty((len(start), normal.shape[1] + 1, start.shape[1]))
     out[:, 0] = start
     transition = np.ascontiguousarray([process.transition for process in processes])
-    _walk(
-        transition,
-        np.ascontiguousarray([root_of(process.added) for process in processes]),
-        normal,
-        out,
-    )
+    root = np.ascontiguousarray([root_of(process.added) for process in processes])
+    _walk(transition, root, normal, out)
     return out
 
 
 def step_s(times_s: np.ndarray) -> float:
     """Return the step (s) between equally spaced times (N,) s; 1 where there is only one."""
-    return float(times_s[-1] - times_s[0]) / (len(times_s) - 1) if len(times_s) > 1 else 1.0
+    if len(times_s) == 1:
+        return 1.0
+    return float(times_s[-1] - times_s[0]) / (len(times_s) - 1)

@@ -1,4 +1,4 @@
-"""Windblown land: the ratio of still to moving echoes, and speckle of unit power with both parts."""
+"""Windblown land: the ratio of still to moving echoes, and speckle of unit power with both."""
 
 import numpy as np
 from scipy import fft
@@ -32,8 +32,9 @@ def windblown(wind_mps: float, frequency_hz: float) -> tuple[float, float]:
 
 
 def spectrum(count: int, step_s: float, slope_s: np.ndarray) -> np.ndarray:
-    """Return the root of the power (cells, count) of spectra exp(-slope |f|), slope (cells,) s,
-    sampled every step.
+    """Return the root of the power (cells, count) of spectra exp(-slope |f|).
+
+    They are sampled every step; slope_s: (cells,).
 
     The images of a spectrum, 1 / step_s apart, are a geometric series. The powers of a cell add to
     1.
@@ -56,8 +57,9 @@ def speckle(
     wavelength_m: float,
     slow: np.ndarray | float = 1.0,
 ) -> np.ndarray:
-    """Return unit-power speckle (cells, count): a constant part plus a part with a two-sided
-    exponential spectrum.
+    """Return unit-power speckle (cells, count): a constant and a moving component.
+
+    The moving one has a two-sided exponential spectrum.
 
     wind: ratio of their powers and slope beta of the spectrum over radial speed (s/m), as of
     `windblown`; slow: factor on Doppler frequencies, a number or (cells,).

@@ -24,8 +24,9 @@ def rows(settings: Settings) -> int:
 
 
 def columns(settings: Settings, symbols: int) -> int:
-    """Return the number of symbols at which a window is computed. Raises: InputError where a look
-    is too short.
+    """Return the number of symbols at which a window is computed.
+
+    Raises: InputError where a look is too short.
     """
     return (windows(symbols, settings.window, settings.hop, "hrrp") - 1) * settings.hop + 1
 
@@ -33,8 +34,9 @@ def columns(settings: Settings, symbols: int) -> int:
 def axes(
     settings: Settings, network: Network, station: Station
 ) -> tuple[tuple[str, float, float], ...]:
-    """Return name, first and last value of the columns (time, s) and of the rows (range from the
-    chosen cell, m).
+    """Return name, first and last value of the columns.
+
+    Columns are time (s), rows range from the chosen cell (m).
     """
     reach = settings.cells // 2 * network.cell_m
     last = (network.symbols - settings.window) * network.symbol_interval_s
@@ -50,14 +52,12 @@ def definition(cube: Cube, settings: Settings) -> np.ndarray:
     cells = cube.cells
     chosen = cube.chosen
     steps = np.arange(-(settings.cells // 2), settings.cells // 2 + 1)
-    near = cells[np.arange(len(cells))[:, None], (chosen[:, None] + steps) % cells.shape[1]].astype(
-        np.complex128
-    )
+    symbol = np.arange(len(cells))[:, None]
+    near = cells[symbol, (chosen[:, None] + steps) % cells.shape[1]].astype(np.complex128)
     power = near.real**2 + near.imag**2
     count = columns(settings, len(cells))
-    return np.sqrt(
-        sum(power[step : step + count] for step in range(settings.window)) / settings.window
-    ).T
+    summed = sum(power[step : step + count] for step in range(settings.window))
+    return np.sqrt(summed / settings.window).T
 
 
 def fill_cells(cube: Cube, settings: Settings, out: np.ndarray) -> None:

@@ -1,5 +1,6 @@
-"""Range-Doppler map: the range cells of a look against radial speed, by one Fourier transform over
-all its symbols.
+"""Range-Doppler map: the range cells of a look against radial speed.
+
+It is one Fourier transform over all symbols of the look.
 
 It is computed from the cube (`lowalt.tiles.cubes`), not from a station's signal, which contains
 only one cell.
@@ -27,12 +28,14 @@ def rows(settings: Settings) -> int:
 
 
 def columns(settings: Settings, symbols: int) -> int:
-    """Return the number of speeds. Raises: InputError where they are fewer than the symbols of a
-    look.
+    """Return the number of speeds.
+
+    Raises: InputError where they are fewer than the symbols of a look.
     """
     if settings.points < symbols:
         raise InputError(
-            f"spectra.range_doppler.points is {settings.points}, expected at least the {symbols} symbols of a look"
+            f"spectra.range_doppler.points is {settings.points}, expected at least the {symbols} "
+            "symbols of a look"
         )
     return settings.points
 
@@ -40,19 +43,18 @@ def columns(settings: Settings, symbols: int) -> int:
 def axes(
     settings: Settings, network: Network, station: Station
 ) -> tuple[tuple[str, float, float], ...]:
-    """Return name, first and last value of the columns (radial speed, m/s) and of the rows (range,
-    m).
+    """Return name, first and last value of the columns.
+
+    Columns are radial speed (m/s), rows range (m).
 
     Ranges count from the cell that the receiver chose in the middle of the look; speeds are
     positive away from the station, at the effective carrier.
     """
     speeds = network.bin_speeds_mps(settings.points, station)
     reach = settings.cells // 2 * network.cell_m
-    return ("radial speed (m/s)", speeds[0], speeds[-1]), (
-        "range (m from the chosen cell)",
-        -reach,
-        reach,
-    )
+    of_columns = ("radial speed (m/s)", speeds[0], speeds[-1])
+    of_rows = ("range (m from the chosen cell)", -reach, reach)
+    return of_columns, of_rows
 
 
 def definition(cube: Cube, settings: Settings) -> np.ndarray:
@@ -67,13 +69,12 @@ def definition(cube: Cube, settings: Settings) -> np.ndarray:
     count = columns(settings, len(cells))
     middle = chosen[len(chosen) // 2]
     reach = settings.cells // 2
-    near = cells[:, np.arange(middle - reach, middle + reach + 1) % cells.shape[1]].astype(
-        np.complex128
-    )
+    around = np.arange(middle - reach, middle + reach + 1) % cells.shape[1]
+    near = cells[:, around].astype(np.complex128)
     weights = hann(len(cells), sym=False)
-    spectrum = fft.fftshift(
-        fft.fft(near * (weights / weights.sum())[:, None], count, axis=0), axes=0
-    )
+    weights /= weights.sum()
+    transformed = fft.fft(near * weights[:, None], count, axis=0)
+    spectrum = fft.fftshift(transformed, axes=0)
     # A receding echo has a negative frequency, so the most negative frequency is the largest speed.
     turned = spectrum[::-1].T
     return np.sqrt(turned.real**2 + turned.imag**2)

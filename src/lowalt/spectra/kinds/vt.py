@@ -40,35 +40,30 @@ def definition(
     frequency_hz: float,
     symbol_interval_s: float,
 ) -> np.ndarray:
-    """Return the spectrum in float64, (..., symbols) -> (..., speeds, windows); the unit is that of
-    |signal|^2.
+    """Return the spectrum in float64, (..., symbols) -> (..., speeds, windows).
+
+    The unit is that of |signal|^2.
 
     Raises: InputError where the signal is no longer than the window or is not finite.
     """
     length = settings.window
     # The published number of windows is one less than the shorter segment allows, so each window
     # can be one longer.
-    parts = segments(signals, length, settings.hop, name, extra=1)
-    steps = np.arange(length + 1)
-    phase = (
-        4
-        * np.pi
-        * frequency_hz
-        * symbol_interval_s
-        / SPEED_OF_LIGHT
-        * np.outer(settings.speeds_mps, steps)
-    )
-    matched = np.exp(1j * phase)
-    short = np.einsum("vl,...gl->...vg", matched[:, :length], parts[..., :length])
-    longer = np.einsum("vl,...gl->...vg", matched, parts)
+    cut = segments(signals, length, settings.hop, name, extra=1)
+    steps = np.outer(settings.speeds_mps, np.arange(length + 1))
+    rad_per_m = 4 * np.pi * frequency_hz * symbol_interval_s / SPEED_OF_LIGHT
+    matched = np.exp(1j * (rad_per_m * steps))
+    short = np.einsum("vl,...gl->...vg", matched[:, :length], cut[..., :length])
+    longer = np.einsum("vl,...gl->...vg", matched, cut)
     return (np.abs(longer) * length / (length + 1)) ** 2 - np.abs(short) ** 2
 
 
 def tables(
     settings: Transfer, frequency_hz: float, symbol_interval_s: float
 ) -> tuple[np.ndarray, ...]:
-    """Return cosines and sines (speeds, window + 1) of the matched filters and the longer window's
-    share (1,).
+    """Return cosines and sines (speeds, window + 1) of the matched filters.
+
+    The longer window's share (1,) comes third.
     """
     length = settings.window
     steps = np.outer(settings.speeds_mps, np.arange(length + 1))
@@ -81,8 +76,9 @@ def tables(
 def fill(
     re: np.ndarray, im: np.ndarray, settings: Transfer, tables: tuple, out: np.ndarray
 ) -> None:
-    """Fill out (speeds, starts) float32 with the spectrum of the windows that start at symbols 0 ..
-    starts - 1.
+    """Fill out (speeds, starts) float32 with the spectrum of windows.
+
+    They start at symbols 0 .. starts - 1.
     """
     transfer(re, im, settings.window, *tables, out)
 
@@ -95,16 +91,17 @@ def fill_known(
     symbol_interval_s: float,
     out: np.ndarray,
 ) -> None:
-    """Fill out (speeds, starts) as `fill`, with the lines that fit a signal (N,) received at
-    `times` (N,) intervals.
+    """Fill out (speeds, starts) as `fill`, with lines that fit a signal received at known times.
+
+    signal: (N,); times: (N,) in symbol intervals.
     """
     starts = out.shape[1]
     length = settings.window
     turns = -2 * frequency_hz * symbol_interval_s / SPEED_OF_LIGHT * settings.speeds_mps
-    short, longer = (
-        length
-        * shares(signal, count, starts)
-        * np.abs(line_sums(signal, times, turns, count, starts))
-        for count in (length, length + 1)
-    )
-    out[:] = longer**2 - short**2
+
+    def filtered(count: int) -> np.ndarray:
+        """Magnitudes (speeds, starts) of the filters matched to `count` symbols."""
+        sums = line_sums(signal, times, turns, count, starts)
+        return length * shares(signal, count, starts) * np.abs(sums)
+
+    out[:] = filtered(length + 1) ** 2 - filtered(length) ** 2

@@ -47,10 +47,10 @@ class AccuracyCostStage(RunStage):
         return data_jobs(self._run)
 
     def studied(self, wildcards: Any) -> list[str]:
-        """Return the predictions of the presets that a study trains on this run's data, one file
-        per training seed.
+        """Return the predictions of the presets that a study trains on this run's data.
 
-        Raises: InputError naming the command that makes them, where one is missing.
+        There is one file per training seed. Raises: InputError naming the command that makes them,
+        where one is missing.
         """
         paths = []
         for row in read_csv(self.presets, "command", "predictions"):

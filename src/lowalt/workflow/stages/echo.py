@@ -12,7 +12,9 @@ class EchoStage(RunStage):
 
     def stations(self, wildcards: Any) -> list[str]:
         """Return the names of the stations whose signals one job makes."""
-        return [wildcards.station] if self._run.echo_per_station else self._run.stations
+        if self._run.echo_per_station:
+            return [wildcards.station]
+        return self._run.stations
 
     def settings(self, wildcards: Any) -> str:
         """Return the network as far as it decides the job's station, and the echo's tolerance."""
@@ -23,7 +25,9 @@ class EchoStage(RunStage):
         return text(network=network, tolerance=self._config["echo"]["tolerance"])
 
     def settings_in_scene(self, wildcards: Any) -> str:
-        """Return the network, the echo's tolerance, the scene's effects with the SNRs of noise that
+        """Return what echoes in a scene depend on.
+
+        It is the network, the echo's tolerance, the scene's effects with the SNRs of noise that
         they add, and the seed that they draw from.
         """
         blocks = self._blocks("seed", "network", "effects")

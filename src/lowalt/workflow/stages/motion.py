@@ -1,4 +1,4 @@
-"""What the rule of motion takes: the flight log, and the values that motion models are drawn from."""
+"""What the rule of motion takes: the flight log, and what motion models are drawn from."""
 
 from typing import Any
 
@@ -18,12 +18,12 @@ class MotionStage(RunStage):
     def track(self) -> list[str]:
         """The flight log whose path motion models follow; none where paths are drawn."""
         block = self._config["motion"]
-        return [block["track"]] if "track" in block else []
+        if "track" not in block:
+            return []
+        return [block["track"]]
 
     def settings(self, wildcards: Any) -> str:
-        """Return what a chunk's motion models are drawn from: region, masts in its reach, ranges of
-        its subtypes.
-        """
+        """Return what motion models are drawn from: region, masts in reach, subtypes' ranges."""
         block = motion_block(self._config)
         members = self._chunk(wildcards).members
         return text(

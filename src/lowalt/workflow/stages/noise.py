@@ -14,11 +14,14 @@ class NoiseStage(RunStage):
     def modules(self) -> list[str]:
         """The modules that the stage loads in a scene whose filters the noise passes."""
         passed = filters(self._config["effects"])
-        return ["lowalt.scene.set_noise", *map(dotted, passed)] if passed else []
+        if not passed:
+            return []
+        return ["lowalt.scene.set_noise", *map(dotted, passed)]
 
     def settings(self, wildcards: Any) -> str:
-        """Return the SNRs, the names of the stations, and the scene's filters, which noise passes."""
+        """Return the SNRs, the names of the stations, and the filters that noise passes."""
         blocks = self._blocks("seed")
-        if passed := filters(self._config["effects"]):
+        passed = filters(self._config["effects"])
+        if passed:
             blocks["filters"] = passed
         return text(**blocks, stations=self._run.stations, snr_db=self._snrs(wildcards))

@@ -27,8 +27,9 @@ class RecognitionStage(RunStage):
         return self._run.is_reduced(int(wildcards.size))
 
     def views(self, wildcards: Any) -> str:
-        """Return pixels a side of the shrunk images; the SNRs too, where the tiles stage makes them
-        for a whole chunk.
+        """Return pixels per side of the shrunk images.
+
+        Where the tiles stage makes them for a whole chunk, the SNRs follow.
         """
         size = int(wildcards.size)
         if self._run.is_reduced(size):
@@ -36,8 +37,10 @@ class RecognitionStage(RunStage):
         return text(size=size)
 
     def samples(self, wildcards: Any) -> dict[str, str | list[str]]:
-        """Return the inputs of a training or evaluation as configured: images reduced to the
-        scheme's size, the index of the shards, or what samples simulated on access are made from.
+        """Return the inputs of a training or evaluation as configured.
+
+        They are images reduced to the scheme's size, the index of the shards, or what samples
+        simulated on access are made from.
         """
         data = f"results/{self._run.data}"
         block = self._config["recognition"]
@@ -49,9 +52,7 @@ class RecognitionStage(RunStage):
         return {"views": [f"{views}/{shard}.npz" for shard in self._run.plan.shards]}
 
     def _simulated(self, data: str) -> dict[str, str | list[str]]:
-        """Return configuration, clouds and, where effects need them, surfaces of the run of a data
-        set.
-        """
+        """Return configuration, clouds and, if effects need them, surfaces of a data set's run."""
         subtypes = self._run.subtypes
         files: dict[str, str | list[str]] = {
             "dataset": f"{data}/config.yaml",
@@ -62,13 +63,17 @@ class RecognitionStage(RunStage):
         return files
 
     def backbone_file(self, wildcards: Any) -> list[str]:
-        """Return the user's file that defines the backbone of a job's scheme; none for a library's."""
+        """Return the user's file that defines the backbone of a job's scheme, if one does."""
         name = self._run.own_backbone(self._scheme(wildcards))
-        return [name.rpartition(":")[0]] if name else []
+        if not name:
+            return []
+        file, _, _ = name.rpartition(":")
+        return [file]
 
     def training(self, wildcards: Any) -> str:
-        """Return settings of a training with its scheme, and its training seed or, if the job has
-        none, the run's seed.
+        """Return settings of a training with its scheme and its seed.
+
+        The seed is the training's own or, if the job has none, the run's.
         """
         block = self._config["recognition"]
         kept = {key: block[key] for key in ("size", "network", "training", "augmentation")}
@@ -85,11 +90,11 @@ class RecognitionStage(RunStage):
         return text(**self._config["recognition"]["evaluation"])
 
     def backbone(self, wildcards: Any) -> list[str]:
-        """Return the option that names the user's code of a scheme's backbone; none for a
-        library's.
-        """
+        """Return the option that names the user's code of a scheme's backbone, if it has some."""
         name = self._run.own_backbone(self._scheme(wildcards))
-        return ["--backbone", name] if name else []
+        if not name:
+            return []
+        return ["--backbone", name]
 
     def seed(self, wildcards: Any) -> str:
         """Return only the run's seed, for tables with intervals."""

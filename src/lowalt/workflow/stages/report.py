@@ -55,8 +55,9 @@ class ReportStage(RunStage):
         return files
 
     def _benchmarks(self, own: str, data: str) -> list[str]:
-        """Return the measurements of all jobs, in pipeline order; own, data: folders of the run and
-        of the run of its data set.
+        """Return the measurements of all jobs, in pipeline order.
+
+        own, data: folders of the run and of the run of its data set.
         """
         paths = [f"{data}/benchmarks/{job}.jsonl" for job in data_jobs(self._run)]
         for rule in ("train", "evaluate"):
@@ -71,7 +72,7 @@ class ReportStage(RunStage):
         return json.dumps(self.files(wildcards), indent=1)
 
     def added_sections(self, wildcards: Any) -> list[str]:
-        """Return the source files and templates of the sections that extensions add to this page."""
+        """Return the source files and templates of sections that extensions add to this page."""
         files = self.files(wildcards)
         modules = [module for name, module in offered("sections").items() if name in files]
         templates = [near(file_of(module).with_suffix(".html")) for module in modules]

@@ -1,4 +1,4 @@
-"""What the rules of shards take: the kind of shards, their settings, and the data card's template."""
+"""What the rules of shards take: the kind of shards, their settings, the data card's template."""
 
 from typing import Any
 
@@ -20,22 +20,23 @@ class ShardsStage(RunStage):
 
     @property
     def modules(self) -> list[str]:
-        """The modules of effects that the stage loads: all where it makes cubes, else those that
-        add to records.
+        """The modules of effects that the stage loads.
+
+        These are all where it makes cubes, otherwise those that add to records.
         """
         effects = self._config["effects"]
         loaded = effects if self.kind == "cube" else of_record(effects)
         return [dotted(name) for name in loaded]
 
     def settings(self, wildcards: Any) -> str:
-        """Return the fold of each sample, its name and its form, and what its record says of the
-        scene.
-        """
+        """Return a sample's fold, name and form, and what its record says of the scene."""
         effects = self._config["effects"]
         added: dict[str, Any] = {}
-        if recorded := of_record(effects):
+        recorded = of_record(effects)
+        if recorded:
             added["record"] = recorded
-        if self.kind == "recipe" and (passed := filters(effects)):
+        passed = filters(effects)
+        if self.kind == "recipe" and passed:
             added["filters"] = passed
         if self.kind == "cube":
             added["echo"] = {"tolerance": self._config["echo"]["tolerance"], "effects": effects}
@@ -43,8 +44,9 @@ class ShardsStage(RunStage):
         return text(**blocks, snr_db=self._snrs(wildcards), classes=self._run.classes, **added)
 
     def piece(self, wildcards: Any) -> list[str]:
-        """Return the number of a shard among the pieces of its chunk's fold, as words of the
-        command; none for a single piece.
+        """Return the number of a shard among the pieces of its chunk's fold, as words of a command.
+
+        A single piece has none.
         """
         pieces = self._run.plan.pieces(f"{wildcards.group}-{wildcards.part}", wildcards.fold)
         if len(pieces) == 1:
@@ -52,8 +54,9 @@ class ShardsStage(RunStage):
         return ["--piece", str(pieces.index(wildcards.piece)), str(len(pieces))]
 
     def index_settings(self, wildcards: Any) -> str:
-        """Return how motion becomes echoes and signals become tiles: with these and the clouds a
-        sample can be made again.
+        """Return how motion becomes echoes and signals become tiles.
+
+        With these and the clouds a sample can be made again.
         """
         echo = {"tolerance": self._config["echo"]["tolerance"], "effects": self._config["effects"]}
         blocks = self._blocks("network", "spectra", "images")

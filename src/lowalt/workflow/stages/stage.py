@@ -29,11 +29,13 @@ def option(name: str, files: str | list[str] | None) -> list[str]:
     """Return an option with its files, as words; none without files."""
     if not files:
         return []
-    return [f"--{name}", *([files] if isinstance(files, str) else files)]
+    if isinstance(files, str):
+        files = [files]
+    return [f"--{name}", *files]
 
 
 def given(*names: str) -> Callable[[Any, Any], list[str]]:
-    """Return a function of wildcards and inputs: options for those of these inputs that a job has."""
+    """Return a function of wildcards and inputs: the options for the inputs that a job has."""
 
     def words(wildcards: Any, input: Any) -> list[str]:
         """Return the options of one job."""
@@ -74,8 +76,9 @@ class RunStage:
         return [written[snr] for snr in self._chunk(wildcards).snrs]
 
     def source(self, wildcards: Any) -> str:
-        """Return the chunk whose motion models and echoes a job uses: its own, or the one to which
-        its chunk adds SNRs.
+        """Return the chunk whose motion models and echoes a job uses.
+
+        It is the job's own, or the one to which its chunk adds SNRs.
         """
         return self._chunk(wildcards).source
 
@@ -84,13 +87,15 @@ class RunStage:
         return [slug(name) for name in self._chunk(wildcards).members]
 
     def scene_subtypes(self, wildcards: Any) -> list[str]:
-        """Return the file names of a chunk's subtypes and of those that the scene's effects need."""
+        """Return the file names of a chunk's subtypes and of those that the effects need."""
         beside = [slug(name) for name in needed_subtypes(self._config["effects"])]
         return list(dict.fromkeys([*self.subtypes(wildcards), *beside]))
 
     def opaque_subtypes(self, wildcards: Any) -> list[str]:
         """Return the file names of a chunk's subtypes where the effects need their surfaces."""
-        return self.subtypes(wildcards) if needs_surfaces(self._config["effects"]) else []
+        if not needs_surfaces(self._config["effects"]):
+            return []
+        return self.subtypes(wildcards)
 
     @property
     def effect_files(self) -> list[str]:
@@ -99,7 +104,10 @@ class RunStage:
 
     @property
     def power_stations(self) -> list[str]:
-        """Stations at which the powers of the targets' own echoes are stored, to which SNRs refer
-        in a scene with effects; none without effects.
+        """Stations at which the powers of the targets' own echoes are stored.
+
+        SNRs refer to these powers in a scene with effects; without effects there is no station.
         """
-        return self._run.stations if self._config["effects"] else []
+        if not self._config["effects"]:
+            return []
+        return self._run.stations

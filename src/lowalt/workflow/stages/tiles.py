@@ -1,4 +1,4 @@
-"""What the rule of tiles takes: spectra and images, and what cubes and late symbols are made from."""
+"""What the rule of tiles takes: spectra, images, and what cubes and late symbols are made of."""
 
 from pathlib import Path
 from typing import Any
@@ -32,8 +32,10 @@ class TilesStage(RunStage):
         return modules
 
     def settings(self, wildcards: Any) -> str:
-        """Return network, spectra and images; what late symbols are drawn from, where spectra know
-        their instants; what range cells are made from, where spectra show them.
+        """Return network, spectra and images, and what else the images of a chunk depend on.
+
+        That is what late symbols are drawn from, where spectra know their instants, and what range
+        cells are made from, where spectra show them.
         """
         blocks = self._blocks("network", "spectra", "images")
         if self._late:
@@ -46,7 +48,8 @@ class TilesStage(RunStage):
         return text(**blocks)
 
     def reduced(self, wildcards: Any, output: Any) -> list[str]:
-        """Return the option that names the reduced images of a chunk by their size, which is the
-        name of their folder.
+        """Return the option that names the reduced images of a chunk by their size.
+
+        The size is the name of their folder.
         """
         return option("reduced", [f"{Path(path).parent.name}={path}" for path in output.reduced])

@@ -1,3 +1,4 @@
-"""Effects between the antennas and the target: amplitudes, paths, physics of waves, further echoes
-and signals.
+"""Effects between the antennas and the target.
+
+They are amplitudes, paths, physics of waves, further echoes and signals.
 """

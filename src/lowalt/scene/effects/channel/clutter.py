@@ -25,16 +25,12 @@ from lowalt.scene.view import Still, View
 
 SOURCE = (
     "constant-gamma land: Barton, Land clutter models for radar design and analysis, Proc. IEEE "
-    "73, 1985; amplitude "
-    "laws: Ward, Tough & Watts, Sea Clutter, 2006, and Kanter, Stable densities under change of "
-    "scale, Ann. Prob. 3, "
-    "1975; texture from cell to cell: Tough & Ward, J. Phys. D 32, 1999, its correlation length: "
-    "estimate; "
-    "windblown clutter: Billingsley, Low-Angle Radar Land Clutter, 2002, chapter 6; on links: "
-    "gamma "
-    "(sin psi_1 sin psi_2)^(1/2), Willis, Bistatic Radar, 2nd ed. 1995, ch. 9, measured in the "
-    "plane of both grazing "
-    "rays; at other angles out of plane, and the spectrum narrowed by cos(beta / 2): estimates"
+    "73, 1985; amplitude laws: Ward, Tough & Watts, Sea Clutter, 2006, and Kanter, Stable "
+    "densities under change of scale, Ann. Prob. 3, 1975; texture from cell to cell: Tough & Ward, "
+    "J. Phys. D 32, 1999, its correlation length: estimate; windblown clutter: Billingsley, "
+    "Low-Angle Radar Land Clutter, 2002, chapter 6; on links: gamma (sin psi_1 sin psi_2)^(1/2), "
+    "Willis, Bistatic Radar, 2nd ed. 1995, ch. 9, measured in the plane of both grazing rays; at "
+    "other angles out of plane, and the spectrum narrowed by cos(beta / 2): estimates"
 )
 DEFAULTS = {
     "gamma": 0.03,
@@ -50,8 +46,9 @@ STILL = True
 
 
 def check(settings: dict, scene: CheckedScene) -> None:
-    """Raise InputError for a station in or below the ground, or an amplitude law without that
-    shape.
+    """Raise InputError for a station in or below the ground.
+
+    Raise it also for an amplitude law without that shape.
     """
     above_ground("clutter", scene.network)
     if settings["law"] == "weibull" and not settings["shape"] <= 2:
@@ -61,8 +58,9 @@ def check(settings: dict, scene: CheckedScene) -> None:
 
 
 def alike(uniform: np.ndarray, correlation: float) -> np.ndarray:
-    """Return uniforms (2, cells) whose normal scores have the correlation `correlation`^lag between
-    cells.
+    """Return uniforms (2, cells) whose normal scores are correlated between cells.
+
+    Their correlation at a lag is `correlation`^lag.
 
     Each stays uniform, so textures made from them keep their distribution. Source: memoryless
     non-linear transform, Tough & Ward, The correlation properties of gamma and other non-Gaussian
@@ -76,8 +74,9 @@ def alike(uniform: np.ndarray, correlation: float) -> np.ndarray:
 
 
 def texture(law: str, shape: float, uniform: np.ndarray) -> np.ndarray:
-    """Return textures (cells,) of mean 1 from uniforms (2, cells); sqrt(texture) times speckle has
-    the law.
+    """Return textures (cells,) of mean 1 from uniforms (2, cells).
+
+    The root of the texture times speckle has the law.
 
     rayleigh: 1; k: gamma variates of order `shape`; weibull: a Weibull power of shape c/2 is an
     exponential over a positive stable variate of index c/2 (Kanter 1975). Amplitudes, not powers,
@@ -98,16 +97,18 @@ def texture(law: str, shape: float, uniform: np.ndarray) -> np.ndarray:
 
 
 def mean_power(settings: dict, view: View) -> tuple[np.ndarray, np.ndarray]:
-    """Return the mean power (cells,) W of the land in each slant-range cell, and the factor on its
-    Doppler.
+    """Return the mean power (cells,) W of the land in each slant-range cell.
+
+    The factor on its Doppler comes second.
     """
     aims_m = np.stack([view.aim_of(view.station.transmitter or view.station), view.aim_m])
     return land.cell_power(settings, view.network, view.station, aims_m, view.element)
 
 
 def levels(settings: dict, view: View) -> list[tuple[str, float, str]]:
-    """Return the mean power (W) of the land in all range cells, and in that of the target, side
-    lobes included.
+    """Return the mean power (W) of the land in all range cells, and in that of the target.
+
+    Side lobes are included.
     """
     power = mean_power(settings, view)[0]
     network = view.network
@@ -121,13 +122,12 @@ def levels(settings: dict, view: View) -> list[tuple[str, float, str]]:
 
 def scatter(settings: dict, view: View, rng: np.random.Generator) -> Still:
     """Return the echoes of the land; samples and stations have independent draws."""
-    network, frequency = view.network, radar(view.network, view.station).centre_hz
+    network = view.network
+    frequency = radar(network, view.station).centre_hz
     power, slow = mean_power(settings, view)
-    correlation = (
-        math.exp(-network.cell_m / settings["correlation_m"])
-        if settings["correlation_m"] > 0
-        else 0.0
-    )
+    correlation = 0.0
+    if settings["correlation_m"] > 0:
+        correlation = math.exp(-network.cell_m / settings["correlation_m"])
     uniform = alike(1.0 - rng.random((2, len(power))), correlation)
     lit = np.sqrt(power * texture(settings["law"], settings["shape"], uniform))
     waves = speckle(
@@ -140,6 +140,5 @@ def scatter(settings: dict, view: View, rng: np.random.Generator) -> Still:
         slow if view.station.transmitter else 1.0,
     )
     cells = land.folded(lit[:, None] * waves, network.subcarriers)
-    return Still(
-        fft.fft(cells, axis=0, overwrite_x=True).T * land.ramp(network.subcarriers), land.OFFSET
-    )
+    response = fft.fft(cells, axis=0, overwrite_x=True).T * land.ramp(network.subcarriers)
+    return Still(response, land.OFFSET)

@@ -1,5 +1,6 @@
-"""Other targets in the beam, such as a flock, or a bird next to a drone. The label is that of the
-primary target.
+"""Other targets in the beam, such as a flock, or a bird next to a drone.
+
+The label is that of the primary target.
 
 At the first symbol, companions stand around the target with a standard deviation of `spread_m` on
 each axis. Members of a flock have the target's velocity plus a normal error of standard deviation
@@ -11,6 +12,7 @@ configuration refer to its echo alone. The record of a sample lists the companio
 
 import math
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
@@ -24,20 +26,20 @@ from lowalt.targets.cloud import Cloud
 
 SOURCE = (
     "several scatterers add as their echoes: M. I. Skolnik, Introduction to Radar Systems, 3rd ed. "
-    "2001, 2.7 (complex "
-    "targets); the spread of a flock: estimate"
+    "2001, 2.7 (complex targets); the spread of a flock: estimate"
 )
 DEFAULTS = {"subtypes": [], "count": [1, 3], "spread_m": 4.0, "speed_mps": 1.0}
 IDLE = [{"count": [0, 0]}]
 JUMPS = True
 
 TRIES = 200
-"""Draws of a place that keeps clear of the other targets, before the spread counts as too small."""
+"""Draws of a position clear of the other targets, before the spread counts as too small."""
 
 
 def check(settings: dict, scene: CheckedScene) -> None:
-    """Raise InputError for a range of counts that falls, or companions whose surfaces the scene
-    would need.
+    """Raise InputError for a range of counts that falls, or companions that need surfaces.
+
+    The surfaces of companions are not known.
     """
     low, high = settings["count"]
     if low > high:
@@ -75,47 +77,50 @@ def record(
 def companions(
     settings: dict, cloud: Cloud, row: dict, clouds: Mapping[str, Cloud], rng: np.random.Generator
 ) -> list[tuple[Cloud, dict]]:
-    """Return the companions of the motion model `row`: their clouds, and their rows as in the
-    motion table.
+    """Return the companions of the motion model `row`.
+
+    They are their clouds, and their rows as in the motion table.
 
     clouds: the clouds of the other subtypes, by name. Raises: InputError naming a subtype without a
     cloud, or a spread that leaves no room for the targets.
     """
-    taken = [(_place(row), _reach(cloud))]
+    taken = [(_position(row), _reach(cloud))]
     result = []
     for number, name in enumerate(named(settings, row["subtype"], rng)):
         if name != row["subtype"] and name not in clouds:
             raise InputError(
-                f"effects.companions.subtypes: no cloud of {name!r} among {sorted(clouds)}, expected one of each"
+                f"effects.companions.subtypes: no cloud of {name!r} among {sorted(clouds)}, "
+                "expected one of each"
             )
         other = cloud if name == row["subtype"] else clouds[name]
+        reach = _reach(other)
         mine = _moving(settings, other, row, rng)
         for _ in range(TRIES):
             offset = settings["spread_m"] * rng.standard_normal(3)
             for axis, shift in zip("xyz", offset, strict=True):
                 mine[f"{axis}_m"] = row[f"{axis}_m"] + float(shift)
+            lowest = reach
             if other.like not in AIRBORNE:
                 mine["z_m"] = other.record["origin_height_m"]
-            place = _place(mine)
-            reach = _reach(other)
-            if place[2] > reach * (other.like in AIRBORNE) and all(
-                norm(place - away) > reach + size for away, size in taken
-            ):
+                lowest = 0.0
+            position = _position(mine)
+            clear = all(norm(position - away) > reach + size for away, size in taken)
+            if clear and position[2] > lowest:
                 break
         else:
             raise InputError(
-                f"effects.companions.spread_m: {settings['spread_m']} m leaves no room for {number + 1} companions of "
-                f"{row['subtype']}, model {row['model']}, expected more"
+                f"effects.companions.spread_m: {settings['spread_m']} m leaves no room for "
+                f"{number + 1} companions of {row['subtype']}, model {row['model']}, expected more"
             )
-        taken.append((place, reach))
+        taken.append((position, reach))
         # Random streams are keyed by this name, so each companion has its own.
         mine["model"] = f"{row['subtype']} {row['model']} companion {number}"
         result.append((other, mine))
     return result
 
 
-def _place(row: dict) -> np.ndarray:
-    """Place (3,) of a row's target at the first symbol (m)."""
+def _position(row: dict) -> np.ndarray:
+    """Position (3,) of a row's target at the first symbol (m)."""
     return np.array([row["x_m"], row["y_m"], row["z_m"]])
 
 
@@ -126,10 +131,11 @@ def _reach(cloud: Cloud) -> float:
 
 
 def _moving(settings: dict, other: Cloud, row: dict, rng: np.random.Generator) -> dict:
-    """A companion's row without its place: in a flock nearly the target's motion, otherwise its
-    subtype's own.
+    """A companion's row without its position.
+
+    In a flock the motion is nearly the target's, otherwise its subtype's own.
     """
-    mine = {
+    mine: dict[str, Any] = {
         **dict.fromkeys(NUMBERS, math.nan),
         "subtype": other.subtype,
         "category": other.category,
@@ -137,9 +143,10 @@ def _moving(settings: dict, other: Cloud, row: dict, rng: np.random.Generator) -
     published = other.record["published"]
     flying = other.like in AIRBORNE
     flock = other.category == row["category"]
-    mine |= {
-        f"{angle}_rad": row[f"{angle}_rad"] if flock else 0.0 for angle in ("yaw", "pitch", "roll")
-    }
+    for angle in ("yaw_rad", "pitch_rad", "roll_rad"):
+        mine[angle] = 0.0
+        if flock:
+            mine[angle] = row[angle]
     speed = 0.0
     if flying:
         for axis in "xyz":
@@ -148,9 +155,8 @@ def _moving(settings: dict, other: Cloud, row: dict, rng: np.random.Generator) -
             mine[f"v{axis}_mps"] = shared if flock else alone
     else:
         alone = rng.uniform(published["speed_lo"], published["speed_hi"])
-        shared = math.hypot(row["vx_mps"], row["vy_mps"]) + settings["speed_mps"] * float(
-            rng.standard_normal()
-        )
+        error = settings["speed_mps"] * float(rng.standard_normal())
+        shared = math.hypot(row["vx_mps"], row["vy_mps"]) + error
         speed = max(shared, 0.0) if flock else alone
     if not flock:
         mine["yaw_rad"] = rng.uniform(0.0, 2 * math.pi)

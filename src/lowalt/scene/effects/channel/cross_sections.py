@@ -1,5 +1,6 @@
-"""Cross sections that follow the aspect: a point shines along its normal, and a turning blade
-flashes.
+"""Cross sections that follow the aspect.
+
+A point shines along its normal, and a turning blade flashes.
 
 Bodies are diffuse: a point's cross section goes with a power of the cosine between its normal and
 the line of sight. Blades are flat facets in physical optics, as large as a point's share of its
@@ -21,12 +22,10 @@ from lowalt.scene.view import View
 
 SOURCE = (
     "diffuse: Phong-type cosine lobes, Lafortune & Willems 1994; flat circular plate in physical "
-    "optics, "
-    "sigma = 4 pi A^2 / lambda^2 (cos 2 J1(x) / x)^2, x = 2 k a sin: Knott, Shaeffer & Tuley, "
-    "Radar Cross Section, 2nd "
-    "ed. 1993, chapter 6; on links: R. E. Kell, On the derivation of bistatic RCS from monostatic "
-    "measurements, Proc. "
-    "IEEE 53(8), 1965; blade flash: Chen, The Micro-Doppler Effect in Radar, 2011, chapter 3"
+    "optics, sigma = 4 pi A^2 / lambda^2 (cos 2 J1(x) / x)^2, x = 2 k a sin: Knott, Shaeffer & "
+    "Tuley, Radar Cross Section, 2nd ed. 1993, chapter 6; on links: R. E. Kell, On the derivation "
+    "of bistatic RCS from monostatic measurements, Proc. IEEE 53(8), 1965; blade flash: Chen, The "
+    "Micro-Doppler Effect in Radar, 2011, chapter 3"
 )
 DEFAULTS = {"power": 1.0, "blades": "facet"}
 ONE_SIDED = True
@@ -39,8 +38,9 @@ def diffuse(cosine: np.ndarray, power: float) -> np.ndarray:
 
 
 def _plate(cosine: np.ndarray, sine: np.ndarray, size: float) -> np.ndarray:
-    """Lobe of a circular plate of k a = `size`, one at its normal; cosine and sine of the angle to
-    it.
+    """Lobe of a circular plate of k a = `size`, one at its normal.
+
+    cosine, sine: of the angle to the normal.
     """
     x = np.maximum(2.0 * size * sine, 1e-9)
     return (cosine * 2.0 * j1(x) / x) ** 2
@@ -48,8 +48,9 @@ def _plate(cosine: np.ndarray, sine: np.ndarray, size: float) -> np.ndarray:
 
 @lru_cache(maxsize=256)
 def _plate_mean(size: float) -> float:
-    """Mean of a plate's lobe over the sphere, by Gauss-Legendre quadrature fine enough for its side
-    lobes.
+    """Mean of a plate's lobe over the sphere.
+
+    It is found by Gauss-Legendre quadrature fine enough for its side lobes.
     """
     node, weight = gauss_legendre(32 + int(2 * size))
     sine, cosine = portable.sine_cosine(0.25 * np.pi * (node + 1.0))
@@ -57,8 +58,9 @@ def _plate_mean(size: float) -> float:
 
 
 def facet(cosine: np.ndarray, size: float, half_angle: np.ndarray | float = 1.0) -> np.ndarray:
-    """Return the lobe of a flat circular facet, of mean 1 over the sphere, dark where the cosine is
-    not above 0.
+    """Return the lobe of a flat circular facet, of mean 1 over the sphere.
+
+    It is dark where the cosine is not above 0.
 
     cosine: of the angle between its normal and the line of sight, on a link the mean of both ends'
     cosines; size: k a, its radius in rad; half_angle: on a link cos(beta / 2), half the length of
@@ -73,13 +75,15 @@ def facet_radius_m(points: np.ndarray) -> float:
 
     Evenly spread points stand in a hexagonal lattice, each with sqrt(3)/2 of its spacing squared.
     """
-    spacing = cKDTree(points).query(points, k=2)[0][:, 1].mean()
+    distances, _ = cKDTree(points).query(points, k=2)
+    spacing = np.asarray(distances)[:, 1].mean()
     return float(np.sqrt(np.sqrt(3.0) / 2.0 / np.pi) * spacing)
 
 
 def aspect_cosine(view: View, place_m: np.ndarray) -> np.ndarray:
-    """Return the cosine (N, L) between every point's normal and its way to a place (3,) m, NaN
-    without a normal.
+    """Return the cosine (N, L) between every point's normal and its way to a place (3,) m.
+
+    It is NaN without a normal.
     """
     way = place_m - view.places
     return portable.dot(view.normals, way) / portable.norm(way)
@@ -88,8 +92,9 @@ def aspect_cosine(view: View, place_m: np.ndarray) -> np.ndarray:
 def blade(
     view: View, mine: np.ndarray, cosines: list[np.ndarray], places_m: list[np.ndarray]
 ) -> np.ndarray:
-    """Return the facets' lobe (N, points) of a rotor's points `mine`; cosines (N, L) toward both
-    ends at places_m.
+    """Return the facets' lobe (N, points) of a rotor's points `mine`.
+
+    cosines: (N, L), toward both ends at places_m.
     """
     wave = 2 * np.pi * radar(view.network, view.station).centre_hz / SPEED_OF_LIGHT
     size = wave * facet_radius_m(view.cloud.points[mine])
@@ -103,22 +108,30 @@ def blade(
 
 
 def visible(settings: dict, view: View, rng: np.random.Generator | None = None) -> np.ndarray:
-    """Return the factor (N, L) on every point's amplitude: the root of its relative cross section
-    at this aspect.
+    """Return the factor (N, L) on every point's amplitude.
+
+    It is the root of its relative cross section at this aspect.
 
     On a link a diffuse point has the geometric mean of the lobes toward both ends, exact for a
     Lambert surface (power 2). A facet has its lobe at the bisector and at the frequency times
     cos(beta / 2), where beta is the angle between the directions toward both ends.
     """
-    cloud, known = view.cloud, np.isfinite(view.cloud.normals).all(axis=1)
+    cloud = view.cloud
+    known = np.isfinite(cloud.normals).all(axis=1)
     if not known.any():
         return np.ones(view.places.shape[:2])
-    places_m = list(view.masts_m) if view.station.transmitter else [view.masts_m[1]]
+    sender_m, receiver_m = view.masts_m
+    places_m = [receiver_m]
+    if view.station.transmitter:
+        places_m = [sender_m, receiver_m]
     cosines = [aspect_cosine(view, place_m) for place_m in places_m]
     lobes = [diffuse(cosine, settings["power"]) for cosine in cosines]
-    lobe = lobes[0] if len(lobes) == 1 else np.sqrt(lobes[0] * lobes[1])
-    for rotor in cloud.parts_of("rotor") if settings["blades"] == "facet" else ():
-        mine = np.flatnonzero(cloud.part == rotor)
-        if len(mine) > 1:
-            lobe[:, mine] = blade(view, mine, cosines, places_m)
+    lobe = lobes[0]
+    if len(lobes) == 2:
+        lobe = np.sqrt(lobes[0] * lobes[1])
+    if settings["blades"] == "facet":
+        for rotor in cloud.parts_of("rotor"):
+            mine = np.flatnonzero(cloud.part == rotor)
+            if len(mine) > 1:
+                lobe[:, mine] = blade(view, mine, cosines, places_m)
     return np.where(known, np.sqrt(lobe), 1.0)

@@ -1,5 +1,6 @@
-"""Echoes later than the cyclic prefix: the receive window then begins with the end of the previous
-symbol.
+"""Echoes later than the cyclic prefix.
+
+The receive window then begins with the end of the previous symbol.
 
 Symbols follow each other without a pause. In the receive window, an echo of delay tau > T_cp
 carries the previous symbol, with other random data, until tau - T_cp, and its own symbol from then
@@ -23,16 +24,18 @@ from lowalt.scene.waveform import prefix_length_s
 
 SOURCE = (
     "3GPP TS 38.211, 5.3.1 (normal cyclic prefix, 144 of 2048 samples); interference beyond it: D. "
-    "Kim, G. L. Stuber, "
-    "Residual ISI cancellation for OFDM with applications to HDTV broadcasting, IEEE J. Sel. Areas "
-    "Commun. 16(8), 1998"
+    "Kim, G. L. Stuber, Residual ISI cancellation for OFDM with applications to HDTV broadcasting, "
+    "IEEE J. Sel. Areas Commun. 16(8), 1998"
 )
 DEFAULTS = {"prefix_s": None}
 UNMODELLED = ("fmcw", "cw")
 
 
 def lost(delay_s: np.ndarray | float, prefix_s: float, network: Network) -> np.ndarray | float:
-    """Return the share of the receive window that an echo of this delay loses, 0 to 1; any shape."""
+    """Return the share of the receive window that an echo of this delay loses, 0 to 1.
+
+    Delays may have any shape.
+    """
     return np.clip((delay_s - prefix_s) * network.subcarrier_spacing_hz, 0.0, 1.0)
 
 
@@ -49,13 +52,12 @@ def levels(settings: dict, view: View) -> list[tuple[str, float, str]]:
 
 
 def late_samples(settings: dict, view: View) -> np.ndarray:
-    """Return how many samples (N, L) of each point's echo, at the start of the window, carry the
-    previous symbol.
+    """Return how many samples (N, L) of each point's echo carry the previous symbol.
+
+    They stand at the start of the window.
     """
     network = view.network
-    late_s = view.ways_m(view.places) / SPEED_OF_LIGHT - prefix_length_s(
-        settings["prefix_s"], network
-    )
+    late_s = view.ways_m(view.places) / SPEED_OF_LIGHT - prefix_s(settings, network)
     rate_hz = network.subcarriers * network.subcarrier_spacing_hz
     return np.clip(np.ceil(late_s * rate_hz), 0, network.subcarriers).astype(np.int64)
 
@@ -67,26 +69,20 @@ def convolved(
     on_air: Callable[[str], np.ndarray],
     offset_cells: float,
 ) -> np.ndarray:
-    """Return the time samples (N, M) of still echoes: the linear convolution of the sent stream
-    with the range cells.
+    """Return the time samples (N, M) of still echoes.
+
+    They are the linear convolution of the sent stream with the range cells.
 
     response: (N, M) of all echoes; on_air: subcarriers (N, M) on the air in the "waveform" and the
-    "previous waveform";
-    offset_cells: distance of the echoes beyond their cells' centres. The prefix counts in whole
-    samples.
+    "previous waveform"; offset_cells: distance of the echoes beyond their cells' centres. The
+    prefix counts in whole samples.
     """
     count = response.shape[1]
-    prefix = min(
-        round(
-            prefix_length_s(settings["prefix_s"], network) * count * network.subcarrier_spacing_hz
-        ),
-        count,
-    )
+    samples = prefix_s(settings, network) * count * network.subcarrier_spacing_hz
+    prefix = min(round(samples), count)
     later = np.exp(-2j * np.pi * offset_cells * np.arange(count) / count)
-    now, before = (
-        fft.ifft(fft.ifftshift(on_air(name) * later, axes=1), axis=1)
-        for name in ("waveform", "previous waveform")
-    )
+    now = fft.ifft(fft.ifftshift(on_air("waveform") * later, axes=1), axis=1)
+    before = fft.ifft(fft.ifftshift(on_air("previous waveform") * later, axes=1), axis=1)
     # Frequencies count from the lowest subcarrier in range cells, from the oscillator's, M // 2
     # higher, in samples.
     cells = fft.ifft(fft.ifftshift(response * later.conj(), axes=1), axis=1)

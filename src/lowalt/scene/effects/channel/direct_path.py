@@ -1,5 +1,6 @@
-"""The direct path of a link between two stations: the sent signal reaches the receiving station
-without the target.
+"""The direct path of a link between two stations.
+
+The sent signal reaches the receiving station without the target.
 
 It has the delay of the distance between the masts and no Doppler shift, and it enters through the
 side lobes of both arrays, whose beams point at the target.
@@ -15,8 +16,8 @@ from lowalt.scene.view import Still, View
 
 SOURCE = (
     "H. T. Friis, A note on a simple transmission formula, Proc. IRE 34, 1946; N. J. Willis, "
-    "Bistatic Radar, 2nd ed. "
-    "1995, ch. 3 (range sum, direct path) and ch. 6 (Doppler of the bisector)"
+    "Bistatic Radar, 2nd ed. 1995, ch. 3 (range sum, direct path) and ch. 6 (Doppler of the "
+    "bisector)"
 )
 DEFAULTS = {"loss_db": 0.0}
 IDLE = [{"loss_db": None}]
@@ -32,7 +33,7 @@ def check(settings: dict, scene: CheckedScene) -> None:
 
 
 def levels(settings: dict, view: View) -> list[tuple[str, float, str]]:
-    """Return the power (W) of the direct path; nothing for a station that receives its own signal."""
+    """Return the power (W) of the direct path, nothing for a station that hears itself."""
     if view.station.transmitter is None:
         return []
     response = from_sender(settings, view).response

@@ -1,5 +1,6 @@
-"""Fluctuation of a target's cross section: an angular pattern (B1) and a log-normal factor (B2) on
-its mean (A).
+"""Fluctuation of a target's cross section about its mean (A).
+
+An angular pattern (B1) and a log-normal factor (B2) act on the mean.
 
 Both act on all points alike. The log-normal factor is drawn once per look and station; both
 directions of a link share one draw. The pattern depends on the direction of the station in the
@@ -26,10 +27,9 @@ from lowalt.targets.cloud import Cloud
 
 SOURCE = (
     "3GPP TR 38.901 V19.4.0, Eqs. 7.9.2-1 to 7.9.2-3, Tables 7.9.2.1-1, -2 and -4 (A, B1, B2 are "
-    "sigma_M, sigma_D, "
-    "sigma_S there); on links, no forward scattering (sigma_FS of minus infinity) and one draw for "
-    "both directions "
-    "(reciprocity): estimates; birds take the small UAV's spread and loss: estimate"
+    "sigma_M, sigma_D, sigma_S there); on links, no forward scattering (sigma_FS of minus "
+    "infinity) and one draw for both directions (reciprocity): estimates; birds take the small "
+    "UAV's spread and loss: estimate"
 )
 DEFAULTS = {"pattern": True, "spread_db": None}
 DRAWN = "pair"
@@ -42,6 +42,9 @@ CUT = 3.0
 """
 
 
+ROOF = 4
+BOTTOM = 5
+"""Numbers of the faces above and below, behind those in front, on the left, back and right."""
 BISTATIC = {LARGE_UAV: (6.05, 1.33), VEHICLE: (6.0, 1.65)}
 """k1 (dB) and k2 of Eq. 7.9.2-3."""
 BISTATIC_DB = 3.0
@@ -53,8 +56,7 @@ def check(settings: dict, scene: CheckedScene) -> None:
     if settings["pattern"] and "cross_sections" in scene.effects:
         raise InputError(
             "effects.fluctuation: pattern is true and effects.cross_sections gives every point a "
-            "pattern of its own, "
-            "expected pattern: false in a scene with both"
+            "pattern of its own, expected pattern: false in a scene with both"
         )
 
 
@@ -68,32 +70,37 @@ def spread_db(cloud: Cloud) -> float:
 def pattern_dbsm(
     faces: tuple[Lobe, ...], azimuth_deg: np.ndarray, zenith_deg: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return 10 lg(sigma_M sigma_D) of a target's face in a direction (any shape), and its least
-    value (dBsm).
+    """Return 10 lg(sigma_M sigma_D) of a target's face in a direction (any shape).
+
+    The least value (dBsm) comes second.
 
     azimuth: 0 front, 90 left.
 
     Faces share the directions as the tables say: the roof above 45 degrees (30 for vehicles), then
     quarters of azimuth.
     """
-    roof, floor = (45.0, 135.0) if len(faces) == len(LARGE_UAV) else (30.0, 181.0)
+    # A vehicle has no face below.
+    roof_deg = 30.0
+    bottom_deg = 181.0
+    if len(faces) == len(LARGE_UAV):
+        roof_deg = 45.0
+        bottom_deg = 135.0
     face = (np.floor((azimuth_deg + 45.0) / 90.0) % 4).astype(int)
-    face = np.where(zenith_deg < roof, 4, np.where(zenith_deg >= floor, 5, face))
-    centre, width, high, tall, peak, depth = (
-        np.array([0.0 if lobe[k] is None else lobe[k] for lobe in faces])[
-            np.minimum(face, len(faces) - 1)
-        ]
-        for k in range(6)
-    )
+    face = np.where(zenith_deg >= bottom_deg, BOTTOM, face)
+    face = np.where(zenith_deg < roof_deg, ROOF, face)
+    # Rows: centre and width in azimuth, centre and width in zenith angle, peak, depth.
+    table = np.array([lobe._replace(azimuth=lobe.azimuth or 0.0) for lobe in faces], float).T
+    centre, width, high, tall, peak, depth = table[:, np.minimum(face, len(faces) - 1)]
     off = (azimuth_deg - centre + 180.0) % 360.0 - 180.0
-    across = np.where(face >= 4, 0.0, np.minimum(12.0 * (off / width) ** 2, depth))
+    across = np.where(face >= ROOF, 0.0, np.minimum(12.0 * (off / width) ** 2, depth))
     along = np.minimum(12.0 * ((zenith_deg - high) / tall) ** 2, depth)
     return peak - np.minimum(across + along, depth), peak - depth
 
 
 def bistatic_loss_db(faces: tuple[Lobe, ...] | None, angle_rad: np.ndarray) -> np.ndarray:
-    """Return the loss (dB) at bistatic angles of 0 to pi (any shape); faces: None for a target
-    without a pattern.
+    """Return the loss (dB) at bistatic angles of 0 to pi (any shape).
+
+    faces: None for a target without a pattern.
 
     Source: TR 38.901, Eq. 7.9.2-3, without its floor, and Eq. 7.9.2-2.
     """
@@ -107,11 +114,12 @@ def bistatic_loss_db(faces: tuple[Lobe, ...] | None, angle_rad: np.ndarray) -> n
 
 
 def pattern(view: View) -> np.ndarray:
-    """Return B1 (N, 1), relative to the mean cross section, in the station's direction or at a
-    link's bisector.
+    """Return B1 (N, 1), relative to the mean cross section.
+
+    It is taken in the station's direction or at a link's bisector.
     """
     cloud = view.cloud
-    faces = None
+    faces: tuple[Lobe, ...] | None = None
     mean = 0.0
     if "body" in cloud.kinds and cloud.like == "Vehicle":
         faces = VEHICLE
@@ -143,12 +151,17 @@ def pattern(view: View) -> np.ndarray:
 
 
 def visible(settings: dict, view: View, rng: np.random.Generator) -> np.ndarray:
-    """Return the factor (N, 1) on all amplitudes: the root of B1 B2, with one draw per look and
-    station or pair.
+    """Return the factor (N, 1) on all amplitudes: the root of B1 B2.
+
+    There is one draw per look and station or pair.
 
     B2 is log-normal with mean one: its mean in dB is -ln(10) / 20 times its variance (Eq. 7.9.2-1).
     """
-    spread = spread_db(view.cloud) if settings["spread_db"] is None else settings["spread_db"]
+    spread = settings["spread_db"]
+    if spread is None:
+        spread = spread_db(view.cloud)
     gained_db = -portable.LN_10 / 20 * spread**2 + spread * min(float(rng.standard_normal()), CUT)
-    factor = pattern(view) if settings["pattern"] else np.ones((len(view.times_s), 1))
+    factor = np.ones((len(view.times_s), 1))
+    if settings["pattern"]:
+        factor = pattern(view)
     return np.sqrt(factor * 10 ** (gained_db / 10))

@@ -19,12 +19,9 @@ from lowalt.scene.view import View
 
 SOURCE = (
     "Fresnel coefficients of a lossy half space: ITU-R P.527, and Balanis, Advanced Engineering "
-    "Electromagnetics, "
-    "section 5.3; medium dry ground: ITU-R P.2040-3, Table 3; rough surface: Miller, Brown & Vegh, "
-    "New "
-    "derivation for the rough-surface reflection coefficient and for the distribution of sea-wave "
-    "elevations, IEE "
-    "Proc. F 131, 1984"
+    "Electromagnetics, section 5.3; medium dry ground: ITU-R P.2040-3, Table 3; rough surface: "
+    "Miller, Brown & Vegh, New derivation for the rough-surface reflection coefficient and for the "
+    "distribution of sea-wave elevations, IEE Proc. F 131, 1984"
 )
 DEFAULTS = {
     "permittivity": None,
@@ -34,46 +31,53 @@ DEFAULTS = {
 }
 IDLE = [{"permittivity": 1, "conductivity_s_m": 0}]
 WAVES = ("reflected by the ground",)
-KNOWN_GHZ = 1.0, 10.0
-"""Carriers between which the properties of medium dry ground are known, which stand for those not
-given.
+KNOWN_GHZ = (1.0, 10.0)
+"""Carriers between which the properties of medium dry ground are known.
+
+They stand for those not given.
 """
 
 
 def check(settings: dict, scene: CheckedScene) -> None:
-    """Raise InputError for a station in or below the ground, or at a carrier whose ground must be
-    given.
+    """Raise InputError for a station in or below the ground.
+
+    Raise it also at a carrier whose ground must be given.
     """
     above_ground("ground_reflection", scene.network)
     low, high = KNOWN_GHZ
+    if None not in (settings["permittivity"], settings["conductivity_s_m"]):
+        return
     for station in scene.network.stations:
         carrier_ghz = radar(scene.network, station).centre_hz / 1e9
-        if (
-            None in (settings["permittivity"], settings["conductivity_s_m"])
-            and not low <= carrier_ghz <= high
-        ):
+        if not low <= carrier_ghz <= high:
             raise InputError(
-                f"effects.ground_reflection: medium dry ground is known from {low:g} to {high:g} GHz, station "
-                f"{station.name} sends at {carrier_ghz:.3g} GHz: expected permittivity and conductivity_s_m"
+                f"effects.ground_reflection: medium dry ground is known from {low:g} to {high:g} "
+                f"GHz, station {station.name} sends at {carrier_ghz:.3g} GHz: expected "
+                "permittivity and conductivity_s_m"
             )
 
 
 def ground(settings: dict, frequency_hz: float) -> tuple[float, float]:
-    """Return permittivity and conductivity (S/m): those given, else medium dry ground's at this
-    frequency.
+    """Return permittivity and conductivity (S/m) of the ground.
+
+    They are those given, or else medium dry ground's at this frequency.
 
     Source: ITU-R P.2040-3, Table 3: 15 f^-0.1 and 0.035 f^1.63 S/m, f in GHz.
     """
-    known = 15.0 * (frequency_hz / 1e9) ** -0.1, 0.035 * (frequency_hz / 1e9) ** 1.63
-    asked = settings["permittivity"], settings["conductivity_s_m"]
-    return tuple(
-        usual if value is None else value for value, usual in zip(asked, known, strict=True)
-    )
+    ghz = frequency_hz / 1e9
+    permittivity = settings["permittivity"]
+    if permittivity is None:
+        permittivity = 15.0 * ghz**-0.1
+    conductivity_s_m = settings["conductivity_s_m"]
+    if conductivity_s_m is None:
+        conductivity_s_m = 0.035 * ghz**1.63
+    return permittivity, conductivity_s_m
 
 
 def roughness(sine: np.ndarray, height_m: float, frequency_hz: float) -> np.ndarray:
-    """Return the factor on the coherent reflection of a surface with heights of standard deviation
-    `height_m`.
+    """Return the factor on the coherent reflection of a rough surface.
+
+    height_m: standard deviation of its heights.
 
     exp(-x) I_0(x) with x = 2 (k sigma sin psi)^2; the rest of the power is scattered in other
     directions.

@@ -1,5 +1,6 @@
-"""Interference: the signals of other stations, from mast to mast and by the target, with data
-unknown to the receiver.
+"""Interference: the signals of other stations, with data unknown to the receiver.
+
+They come from mast to mast and by the target.
 
 A station hears every other station: its subcarriers at full level where sub-bands overlap
 (`guard_subcarriers` below 0), and its leakage elsewhere. The receiver divides both by its own data,
@@ -26,10 +27,9 @@ from lowalt.scene.waveform import baseband_hz, windowed
 
 SOURCE = (
     "3GPP TS 38.104, 6.6.3 (adjacent channel leakage ratio of base stations, 45 dB below 7 GHz; "
-    "here the same at any "
-    "distance in frequency); H. T. Friis 1946 (from mast to mast); M. Braun, OFDM Radar Algorithms "
-    "in Mobile "
-    "Communication Networks, KIT 2014, ch. 4 and 5 (other nodes as noise)"
+    "here the same at any distance in frequency); H. T. Friis 1946 (from mast to mast); M. Braun, "
+    "OFDM Radar Algorithms in Mobile Communication Networks, KIT 2014, ch. 4 and 5 (other nodes as "
+    "noise)"
 )
 DEFAULTS = {"leakage_db": 45.0, "loss_db": 0.0, "sigma_ppm": 0.017, "sigma_s": 2e-8}
 UNMODELLED = ("links", "fmcw", "cw")
@@ -47,11 +47,11 @@ def arrivals(settings: dict, sample: SceneSample, sends: Station) -> list[tuple[
     A way is a pair: its response (N or 1, M) on the receiver's subcarriers, as if the sender used
     all of them, and its delay (s).
     """
-    view, hears = sample.view, sample.view.station
+    view = sample.view
+    hears = view.station
     there = replace(sends, frequency_hz=hears.frequency_hz)
-    seen = view.of(
-        replace(hears, name=f"{sends.name}-{hears.name}", transmitter=there, receiver=hears)
-    )
+    name = f"{sends.name}-{hears.name}"
+    seen = view.of(replace(hears, name=name, transmitter=there, receiver=hears))
     direct, delay_s = crossing(view, there, hears)
     by_target_s = float(seen.ways_m(view.origin_m)) / SPEED_OF_LIGHT
     return [
@@ -65,7 +65,8 @@ def heard(settings: dict, sample: SceneSample) -> np.ndarray:
 
     Data and leakage are drawn per receiver; errors of clocks and oscillators are drawn per look.
     """
-    view, network = sample.view, sample.view.network
+    view = sample.view
+    network = view.network
     total = np.zeros((network.symbols, network.subcarriers), np.complex128)
     errors = of_stations(settings, network, sample.scene.stream("link_offset", view.row))
     step_hz = network.subcarrier_spacing_hz
@@ -82,12 +83,12 @@ def heard(settings: dict, sample: SceneSample) -> np.ndarray:
         samples = np.zeros_like(total)
         for response, delay_s in arrivals(settings, sample, sends):
             late_s = delay_s + shift_s
-            late = min(np.ceil(late_s * rate_hz), 0) + max(
-                np.ceil((late_s - sample.prefix_s) * rate_hz), 0
-            )
-            samples += windowed(
-                network, sample.prefix_s, response * ramp, int(np.clip(late, -count, count)), data
-            )
+            # Samples of the next symbol where the signal is early, below 0, and of the previous one
+            # where it is later than the prefix.
+            early = min(np.ceil(late_s * rate_hz), 0)
+            beyond = max(np.ceil((late_s - sample.prefix_s) * rate_hz), 0)
+            late = int(np.clip(early + beyond, -count, count))
+            samples += windowed(network, sample.prefix_s, response * ramp, late, data)
         turn_hz = 1e-6 * ppm * (view.station.frequency_hz + middle * step_hz)
         within = np.exp(2j * np.pi * turn_hz * number / rate_hz)
         total += samples * within * np.exp(2j * np.pi * turn_hz * view.times_s)[:, None]
@@ -100,15 +101,15 @@ def sent(settings: dict, sample: SceneSample, sends: Station) -> Callable[[str],
     Where sub-bands overlap they are its subcarriers, elsewhere its leakage, which is noise.
     """
     network = sample.view.network
-    first = round(
-        (sends.frequency_hz - sample.view.station.frequency_hz) / network.subcarrier_spacing_hz
-    )
+    apart_hz = sends.frequency_hz - sample.view.station.frequency_hz
+    first = round(apart_hz / network.subcarrier_spacing_hz)
     number = np.arange(network.subcarriers) - first
     whole = np.flatnonzero((number >= 0) & (number < network.subcarriers))
 
     def data(symbol: str) -> np.ndarray:
-        """Those of the "waveform", or of the symbols before and after, the "previous" and the "next
-        waveform".
+        """Return the data of the "waveform", or of the "previous" or the "next waveform".
+
+        These are of the symbols before and after.
         """
         result = np.zeros((network.symbols, network.subcarriers), np.complex128)
         if len(whole) < network.subcarriers:
@@ -116,7 +117,9 @@ def sent(settings: dict, sample: SceneSample, sends: Station) -> Callable[[str],
             power = 10 ** (-settings["leakage_db"] / 10)
             result = white(rng, power, result.shape)
         if len(whole):
-            result[:, whole] = sample.on_air(f"{symbol} of {sends.name}")[:, whole - first]
+            aired = sample.on_air(f"{symbol} of {sends.name}")
+            assert aired is not None  # every symbol of OFDM has data
+            result[:, whole] = aired[:, whole - first]
         return result
 
     return cache(data)

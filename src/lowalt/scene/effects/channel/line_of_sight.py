@@ -1,5 +1,6 @@
-"""Blocked line of sight: buildings hide a target from a station with the probability of a 3GPP
-environment.
+"""Blocked line of sight: buildings hide a target from a station.
+
+The probability is that of a 3GPP environment.
 
 One draw per sample and station decides for the whole look. A blocked echo loses `blocked_db` on the
 way out and again on the way back. A target that is hidden from a station is also hidden on that
@@ -15,9 +16,8 @@ from lowalt.scene.view import View
 
 SOURCE = (
     "3GPP TR 36.777, Table B-1 (UMa-AV, UMi-AV, RMa-AV), below them TR 38.901, Table 7.4.2-1; 20 "
-    "dB one way: estimate, "
-    "near the 17 dB between TR 36.777's path losses without and with line of sight at 300 m, "
-    "height 50 m, 4.9 GHz"
+    "dB one way: estimate, near the 17 dB between TR 36.777's path losses without and with line of "
+    "sight at 300 m, height 50 m, 4.9 GHz"
 )
 DEFAULTS = {"environment": "UMa", "blocked_db": 20.0}
 IDLE = [{"blocked_db": 0}]
@@ -34,24 +34,27 @@ def probability(environment: str, flat_m: float, height_m: float) -> float:
         if height_m > 40:
             return 1.0
         if height_m <= 10:
-            return 1.0 if flat_m <= 10 else math.exp(-(flat_m - 10) / 1000)
+            return math.exp(-max(flat_m - 10, 0.0) / 1000)
         return _falling(flat_m, max(1350.8 * lg - 1602, 18.0), max(15021 * lg - 16053, 1000.0))
     if height_m > 22.5:
         if environment == "UMi":
             return _falling(flat_m, max(294.05 * lg - 432.94, 18.0), 233.98 * lg - 0.95)
-        return (
-            1.0 if height_m > 100 else _falling(flat_m, max(460 * lg - 700, 18.0), 4300 * lg - 3800)
-        )
-    plain = _falling(flat_m, 18.0, 36.0 if environment == "UMi" else 63.0)
-    if environment == "UMi" or height_m <= 13 or flat_m <= 18:
+        if height_m > 100:
+            return 1.0
+        return _falling(flat_m, max(460 * lg - 700, 18.0), 4300 * lg - 3800)
+    if environment == "UMi":
+        return _falling(flat_m, 18.0, 36.0)
+    plain = _falling(flat_m, 18.0, 63.0)
+    if height_m <= 13 or flat_m <= 18:
         return plain
     taller = ((height_m - 13) / 10) ** 1.5
     return min(plain * (1 + taller * 1.25 * (flat_m / 100) ** 3 * math.exp(-flat_m / 150)), 1.0)
 
 
 def _falling(flat_m: float, near_m: float, decay_m: float) -> float:
-    """1 up to the distance d = `near_m`; beyond it d / D + exp(-D / p) (1 - d / D), D = `flat_m`, p
-    = `decay_m`.
+    """Return 1 up to the distance `near_m`, and a falling probability beyond it.
+
+    With d = `near_m`, D = `flat_m` and p = `decay_m` it is d / D + exp(-D / p) (1 - d / D).
     """
     if flat_m <= near_m:
         return 1.0
@@ -59,13 +62,14 @@ def _falling(flat_m: float, near_m: float, decay_m: float) -> float:
 
 
 def visible_one_way(settings: dict, view: View, rng: np.random.Generator) -> np.ndarray:
-    """Return the factor (N, 1) on all amplitudes: 1, or 10^(-`blocked_db` / 10) for two blocked
-    ways; one draw.
+    """Return the factor (N, 1) on all amplitudes: 1, or that of two blocked ways.
+
+    The latter is 10^(-`blocked_db` / 10); one number is drawn.
     """
-    x, y, height = (view.row[f"{axis}_m"] for axis in "xyz")
-    place = view.station.position_m
-    flat = math.hypot(x - place[0], y - place[1])
-    blocked = float(rng.random()) >= probability(settings["environment"], flat, height)
-    return np.full(
-        (len(view.times_s), 1), 10 ** (-2 * settings["blocked_db"] / 20) if blocked else 1.0
-    )
+    station_x, station_y, _ = view.station.position_m
+    flat = math.hypot(view.row["x_m"] - station_x, view.row["y_m"] - station_y)
+    clear = probability(settings["environment"], flat, view.row["z_m"])
+    factor = 1.0
+    if float(rng.random()) >= clear:
+        factor = 10 ** (-2 * settings["blocked_db"] / 20)
+    return np.full((len(view.times_s), 1), factor)

@@ -1,5 +1,6 @@
-"""Beams that miss the target: an error of their direction, drawn at every update, and a target that
-flies on between.
+"""Beams that miss the target.
+
+Their direction has an error, drawn at every update, and the target flies on between.
 
 Both beams point where the tracker last saw the target, off by the error. Without updates they keep
 pointing at the target's place at the first symbol, as the paper's do. An update turns the beams
@@ -16,8 +17,8 @@ from lowalt.scene.view import Beams, View
 
 SOURCE = (
     "R. J. Mailloux, Phased Array Antenna Handbook, 3rd ed. 2018, ch. 1 and 7 (pattern and "
-    "pointing error of a steered "
-    "array); standard deviation of a tenth of the default array's 6.4 degrees beam: estimate"
+    "pointing error of a steered array); standard deviation of a tenth of the default array's 6.4 "
+    "degrees beam: estimate"
 )
 DEFAULTS = {"sigma_deg": 0.64, "update_s": None}
 IDLE = [{"sigma_deg": 0, "update_s": None}]
@@ -28,14 +29,15 @@ def check(settings: dict, scene: CheckedScene) -> None:
     step = scene.network.symbol_interval_s
     if settings["update_s"] is not None and settings["update_s"] < step:
         raise InputError(
-            f"effects.pointing_error.update_s: {settings['update_s']}, expected null or at least the symbol "
-            f"interval {step}"
+            f"effects.pointing_error.update_s: {settings['update_s']}, expected null or at least "
+            f"the symbol interval {step}"
         )
 
 
 def turned(aim_m: np.ndarray, station_m: np.ndarray, angles_rad: np.ndarray) -> np.ndarray:
-    """Return aims (K, 3) m turned about the station by angles (K, 2) rad, azimuth and elevation;
-    their range stays.
+    """Return aims (K, 3) m turned about the station by angles (K, 2) rad, azimuth and elevation.
+
+    Their range stays.
     """
     d = aim_m - station_m
     azimuth = portable.arctan2(d[:, 1], d[:, 0]) + angles_rad[:, 0]
@@ -47,8 +49,9 @@ def turned(aim_m: np.ndarray, station_m: np.ndarray, angles_rad: np.ndarray) -> 
 
 
 def beams(settings: dict, view: View, rng: np.random.Generator) -> Beams:
-    """Return the beams of the look: one, or one an update; two draws each. The tracker follows the
-    mean course.
+    """Return the beams of the look: one, or one an update.
+
+    Two numbers are drawn for each.
     """
     last = float(view.network.times_s[-1])
     update = settings["update_s"]

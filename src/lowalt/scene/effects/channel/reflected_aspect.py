@@ -1,5 +1,6 @@
-"""Aspect and occlusion along reflected paths: the ground and a facade see another side of a target
-than the station.
+"""Aspect and occlusion along reflected paths.
+
+The ground and a facade see another side of a target than the station.
 
 A point sees a reflected path come from the station's mirror image. Out and back on that path, the
 target has the aspect and the shadows that a station at the mirror image would see. Where the
@@ -19,35 +20,35 @@ from lowalt.scene.view import View
 
 SOURCE = (
     "images of the station: Balanis, Advanced Engineering Electromagnetics, section 7.4; product "
-    "of one factor for "
-    "each way: reciprocity, exact for a Lambert surface (Lambert's cosine law, cos i cos s) and "
-    "for opaque shadows, an "
-    "estimate for facets"
+    "of one factor for each way: reciprocity, exact for a Lambert surface (Lambert's cosine law, "
+    "cos i cos s) and for opaque shadows, an estimate for facets"
 )
 DEFAULTS: dict[str, float] = {}
 
 
 def check(settings: dict, scene: CheckedScene) -> None:
-    """Raise InputError where the scene has no reflected path, or no effect that depends on the side
-    that a target shows.
+    """Raise InputError where the scene has no reflected path, or no side to follow.
+
+    An effect must depend on the side that a target shows.
     """
     if not scene.offering("paths"):
         raise InputError(
-            f"effects.reflected_aspect: there is no reflected route, expected {with_offer('paths')} "
-            "in the same scene"
+            "effects.reflected_aspect: there is no reflected route, expected "
+            f"{with_offer('paths')} in the same scene"
         )
     if not scene.offering("ONE_SIDED"):
         raise InputError(
-            f"effects.reflected_aspect: no side to follow, expected {with_offer('ONE_SIDED')} in the "
-            "same scene"
+            f"effects.reflected_aspect: no side to follow, expected {with_offer('ONE_SIDED')} in "
+            "the same scene"
         )
 
 
 def routes(
     settings: dict, view: View, paths: list[ImagePath], weight: Callable[..., np.ndarray]
 ) -> np.ndarray:
-    """Return the factors (R, R, N, L) on two-way amplitudes, out by path a and back by path b, the
-    direct one first.
+    """Return the factors (R, R, N, L) on two-way amplitudes.
+
+    Waves go out by path a and back by path b, the direct one first.
 
     weight(view, one_sided): product (N, L) of the effects' amplitude factors as `view` sees them.
     On a link, both ways by the same kind of path are the link between both images. A path without
@@ -62,7 +63,7 @@ def routes(
     def two_way(
         end: View, image_m: np.ndarray | None, sender_m: np.ndarray | None = None
     ) -> np.ndarray:
-        """The followed effects' factor (N, L) for a station, or a link, that stands at its image."""
+        """The followed effects' factor (N, L) for a station, or a link, at its image."""
         if image_m is None and sender_m is None:
             return weight(end, one_sided=True)
         place_m = end.masts_m[1] if image_m is None else image_m

@@ -1,5 +1,6 @@
-"""Motion inside a symbol: points move while an OFDM symbol lasts, so their subcarriers leak into
-each other.
+"""Motion inside a symbol: points move while an OFDM symbol lasts.
+
+Their subcarriers then leak into each other.
 
 Every time sample of a symbol sees the target where it then stands. The samples are interpolated
 between a few instants. A sample of an FMCW sweep is one frequency of Eq. 24 at its own time, so
@@ -16,8 +17,7 @@ from lowalt.scene.view import Displacement, View
 
 SOURCE = (
     "Robertson and Kaiser, The effects of Doppler spreads in OFDM(A) mobile radio systems, Proc. "
-    "IEEE VTC Fall, 1999; "
-    "FMCW: Stove, Linear FMCW radar techniques, IEE Proc. F 139(5), 1992; "
+    "IEEE VTC Fall, 1999; FMCW: Stove, Linear FMCW radar techniques, IEE Proc. F 139(5), 1992; "
     "number of instants: Trefethen, Approximation Theory and Approximation Practice, 2013, theorem "
     "8.2"
 )
@@ -26,8 +26,9 @@ UNMODELLED = ("cw",)
 
 
 def instants(settings: dict, view: View) -> tuple[np.ndarray, np.ndarray]:
-    """Return instants (Q,) s after a symbol's beginning, and their weights (Q, M) in each of its M
-    samples.
+    """Return instants (Q,) s after a symbol's beginning.
+
+    Their weights (Q, M) in each of its M samples come second.
 
     Q Chebyshev points hold the phase that the fastest point gathers in a symbol of length T, 4 pi f
     v T / c in all.
@@ -43,8 +44,9 @@ def instants(settings: dict, view: View) -> tuple[np.ndarray, np.ndarray]:
 
 
 def displaced(settings: dict, view: View, rng: np.random.Generator) -> Displacement:
-    """Return how late an FMCW echo appears by the range-Doppler coupling, f tau' sweep_s /
-    sweep_hz.
+    """Return how late an FMCW echo appears by the range-Doppler coupling.
+
+    It is f tau' sweep_s / sweep_hz.
 
     The frequency f is that at the end of the sweep, since f(t) tau(t) grows with tau' both by f and
     by its own slope.

@@ -19,8 +19,8 @@ from lowalt.scene.view import View
 
 SOURCE = (
     "image method: Balanis, Advanced Engineering Electromagnetics, section 7.4; concrete at 4.9 "
-    "GHz: ITU-R P.2040-1, "
-    "Table 3; places of the facades: this project's own, inside the default network"
+    "GHz: ITU-R P.2040-1, Table 3; places of the facades: this project's own, inside the default "
+    "network"
 )
 DEFAULTS = {
     "facades": [
@@ -40,15 +40,17 @@ def check(settings: dict, scene: CheckedScene) -> None:
     for facade in settings["facades"]:
         if min(facade[3:]) <= 0:
             raise InputError(
-                f"effects.walls.facades: {facade} has width and height {facade[3:]}, expected positive"
+                f"effects.walls.facades: {facade} has width and height {facade[3:]}, expected "
+                "positive"
             )
 
 
 def mirrored(
     facade: list[float], places: np.ndarray, station_m: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return images (N, L, 3) m of places (N, L, 3) m, the sine of the grazing angle, and whether
-    the ray is reflected.
+    """Return images (N, L, 3) m of places (N, L, 3) m, and how their rays are reflected.
+
+    That is the sine of the grazing angle, and whether the ray is reflected.
 
     facade: x, y of its foot's middle (m), azimuth of its normal (degrees), width and height (m). A
     ray is reflected where station and point are on the same side and the line to the image meets
@@ -74,8 +76,9 @@ def mirrored(
 
 
 def paths(settings: dict, view: View) -> list[ImagePath]:
-    """Return one path per facade: images (N, L, 3) m and coefficients (N, L), zero where no ray is
-    reflected.
+    """Return one path per facade: images (N, L, 3) m and coefficients (N, L).
+
+    Coefficients are zero where no ray is reflected.
 
     A facade that reflects nothing in the whole look has the coefficient 0.0, and the points
     themselves as images.
@@ -89,11 +92,10 @@ def paths(settings: dict, view: View) -> list[ImagePath]:
     for facade in settings["facades"]:
         images, sine, reflected = mirrored(facade, view.places, station_m)
         behind = mirrored(facade, station_m[None, None], station_m)[0][0, 0]
-        if reflected.any():
-            mirror = chebyshev_series.at(
-                lambda sine: fresnel(sine, *material), sine
-            ) * view.relative_gain(images)
-            result.append(ImagePath(images, np.where(reflected, mirror, 0.0), behind))
-        else:
+        if not reflected.any():
             result.append(ImagePath(view.places, 0.0, behind))
+            continue
+        mirror = chebyshev_series.at(lambda sine: fresnel(sine, *material), sine)
+        mirror = mirror * view.relative_gain(images)
+        result.append(ImagePath(images, np.where(reflected, mirror, 0.0), behind))
     return result

@@ -26,11 +26,9 @@ from lowalt.scene.laws.windblown import windblown
 
 SOURCE = (
     "M. A. Richards, Fundamentals of Radar Signal Processing, 2nd ed. 2014, 5.2 (pulse cancellers, "
-    "their response and "
-    "noise gain); A. M. Haimovich, Y. Bar-Ness, An eigenanalysis interference canceler, IEEE "
-    "Trans. Signal Process. "
-    "39(1), 1991 (clutter); its covariance: Billingsley, Low-Angle Radar Land Clutter, 2002, "
-    "chapter 6; depth: estimate"
+    "their response and noise gain); A. M. Haimovich, Y. Bar-Ness, An eigenanalysis interference "
+    "canceler, IEEE Trans. Signal Process. 39(1), 1991 (clutter); its covariance: Billingsley, "
+    "Low-Angle Radar Land Clutter, 2002, chapter 6; depth: estimate"
 )
 DEFAULTS = {
     "kind": "mean",
@@ -51,8 +49,9 @@ KINDS = {
 
 
 def check(settings: dict, scene: CheckedScene) -> None:
-    """Raise InputError where nothing stands still, and for `clutter` where symbols are missing or
-    of another radar.
+    """Raise InputError where nothing stands still, or `clutter` does not fit the symbols.
+
+    Symbols may be missing, or be those of another radar.
     """
     if not scene.offering("STILL"):
         raise InputError(
@@ -63,14 +62,14 @@ def check(settings: dict, scene: CheckedScene) -> None:
         return
     if leaving := scene.saying("gaps"):
         raise InputError(
-            "effects.canceller.kind: 'clutter' needs all symbols, and "
-            f"effects.{leaving[0]} leaves gaps, expected mean or pulse"
+            f"effects.canceller.kind: 'clutter' needs all symbols, and effects.{leaving[0]} leaves "
+            "gaps, expected mean or pulse"
         )
     for key in ("carrier_hz", "symbol_interval_s"):
         if settings[key] != getattr(scene.network, key):
             raise InputError(
-                f"effects.canceller.{key}: {settings[key]:g}, expected the network's {getattr(scene.network, key):g}, "
-                "for which kind 'clutter' is made"
+                f"effects.canceller.{key}: {settings[key]:g}, expected the network's "
+                f"{getattr(scene.network, key):g}, for which kind 'clutter' is made"
             )
 
 
@@ -103,8 +102,9 @@ def filtered(settings: dict, cells: np.ndarray) -> np.ndarray:
 def land(
     symbols: int, carrier_hz: float, interval_s: float, wind_mps: float, depth_db: float
 ) -> np.ndarray:
-    """Return the components (N, K) of windblown land's echoes over N symbols that lie above its
-    power less `depth_db`.
+    """Return the components (N, K) of windblown land's echoes over N symbols.
+
+    They are those that lie above the land's power less `depth_db`.
 
     They are orthonormal: the constant, in which all that stands still lies however loud it is, and
     the eigenvectors of the moving part's covariance beside it. The exponential Doppler spectrum of

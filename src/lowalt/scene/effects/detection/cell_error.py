@@ -21,15 +21,17 @@ def check(settings: dict, scene: CheckedScene) -> None:
     spread = settings["spread_cells"]
     if 2 * spread >= cells:
         raise InputError(
-            f"effects.cell_error.spread_cells: {spread}, expected less than half of {cells} range cells"
+            f"effects.cell_error.spread_cells: {spread}, expected less than half of {cells} range "
+            "cells"
         )
 
 
 def choose(
     settings: dict, chosen: np.ndarray, cells: np.ndarray, look: Look, rng: np.random.Generator
 ) -> np.ndarray:
-    """Return chosen cells (N,) int64, each wrong with `probability`; cells (N, M) wrap around as
-    ranges do.
+    """Return chosen cells (N,) int64, each wrong with `probability`.
+
+    cells: (N, M), which wrap around as ranges do.
 
     A wrong cell is off by a whole number, uniform on -spread .. spread without 0. 2 N draws.
     """

@@ -1,5 +1,6 @@
-"""Detection of the target's cell: a threshold at a constant false-alarm rate (CFAR), within a gate
-that follows it.
+"""Detection of the target's cell: a threshold (CFAR) within a gate that follows the cell.
+
+The threshold keeps a constant false-alarm rate.
 
 The paper takes the strongest of all cells. Behind noise in all cells, that is often a wrong one: at
 an SNR of 3 dB the right one of 256 wins 11 % of the symbols, at 8 dB 58 %; behind land it is the
@@ -27,15 +28,12 @@ from lowalt.scene.waveform import Look
 
 SOURCE = (
     "cell averaging: Finn & Johnson, Adaptive detection mode with threshold control, RCA Review "
-    "29, 1968; ordered "
-    "statistic: Rohling, Radar CFAR thresholding in clutter and multiple target situations, IEEE "
-    "Trans. Aerosp. "
-    "Electron. Syst. 19(4), 1983, which advises three quarters; Hann window: Harris, On the use of "
-    "windows "
-    "for harmonic analysis with the discrete Fourier transform, Proc. IEEE 66(1), 1978; alpha-beta "
-    "filter: Benedict & Bordner, Synthesis of an optimal set of radar track-while-scan smoothing "
-    "equations, IRE Trans. "
-    "Automatic Control 7, 1962; range error at the aim of one range cell of 30 MHz: estimate"
+    "29, 1968; ordered statistic: Rohling, Radar CFAR thresholding in clutter and multiple target "
+    "situations, IEEE Trans. Aerosp. Electron. Syst. 19(4), 1983, which advises three quarters; "
+    "Hann window: Harris, On the use of windows for harmonic analysis with the discrete Fourier "
+    "transform, Proc. IEEE 66(1), 1978; alpha-beta filter: Benedict & Bordner, Synthesis of an "
+    "optimal set of radar track-while-scan smoothing equations, IRE Trans. Automatic Control 7, "
+    "1962; range error at the aim of one range cell of 30 MHz: estimate"
 )
 DEFAULTS = {
     "range_error_m": 5.0,
@@ -50,8 +48,9 @@ DEFAULTS = {
 TRIED = True
 NAMES = {"cfar": ("cell_averaging", "ordered_statistic"), "range_window": ("none", "hann")}
 HANN_REACH = 2
-"""Noise of range cells behind a Hann window is independent where they are more than this many cells
-apart.
+"""Range cells farther apart than this have independent noise behind a Hann window.
+
+The distance counts in cells.
 """
 
 
@@ -71,8 +70,9 @@ def check(settings: dict, scene: CheckedScene) -> None:
 
 
 def check_threshold(settings: dict) -> None:
-    """Raise InputError for an unknown name, or for guard cells whose noise a Hann window makes like
-    the cell's.
+    """Raise InputError for an unknown name.
+
+    Raise it also for guard cells whose noise a Hann window makes like the cell's.
     """
     for key, names in NAMES.items():
         if settings[key] not in names:
@@ -81,8 +81,8 @@ def check_threshold(settings: dict) -> None:
             )
     if settings["range_window"] == "hann" and settings["guard"] < HANN_REACH:
         raise InputError(
-            f"effects.detector.guard: {settings['guard']}, expected at least {HANN_REACH} with range_window: hann, "
-            "behind which noise of neighbouring cells is alike"
+            f"effects.detector.guard: {settings['guard']}, expected at least {HANN_REACH} with "
+            "range_window: hann, behind which noise of neighbouring cells is alike"
         )
 
 
@@ -96,8 +96,9 @@ def factor(count: int, false_alarm: float) -> float:
 
 
 def ordered_factor(count: int, rank: int, false_alarm: float) -> float:
-    """Return the threshold T of a cell over the `rank`-th smallest power of `count` cells, 1 <=
-    rank <= count.
+    """Return the threshold T of a cell over the `rank`-th smallest power of `count` cells.
+
+    The rank is 1 to `count`.
 
     A cell of complex Gaussian noise exceeds it with the probability `false_alarm`, the product of
     (count - i) / (count - i + T) over i = 0 .. rank - 1. Source: Rohling 1983.
@@ -106,11 +107,12 @@ def ordered_factor(count: int, rank: int, false_alarm: float) -> float:
     # No factor is smaller than that of i = rank - 1 or larger than that of i = 0, which bounds T
     # from above.
     most = count * (false_alarm ** (-1.0 / rank) - 1.0)
-    return float(
-        brentq(
-            lambda t: log(1.0 + t / left).sum() + math.log(false_alarm), 0.0, 2.0 * most, xtol=1e-12
-        )
-    )
+
+    def excess(t: float) -> float:
+        """The logarithm of the probability over that of a false alarm, turned round."""
+        return log(1.0 + t / left).sum() + math.log(false_alarm)
+
+    return float(brentq(excess, 0.0, 2.0 * most, xtol=1e-12))
 
 
 def windowed(settings: dict, cells: np.ndarray) -> np.ndarray:
@@ -121,12 +123,15 @@ def windowed(settings: dict, cells: np.ndarray) -> np.ndarray:
     """
     if settings["range_window"] == "none":
         return cells
-    return (2 * cells - np.roll(cells, 1, axis=1) - np.roll(cells, -1, axis=1)) / math.sqrt(6)
+    before = np.roll(cells, 1, axis=1)
+    after = np.roll(cells, -1, axis=1)
+    return (2 * cells - before - after) / math.sqrt(6)
 
 
 def exceeds(settings: dict, power: np.ndarray) -> np.ndarray:
-    """Return which cells of the powers (N, M), `windowed`, exceed their threshold, (N, M) bool;
-    ranges wrap around.
+    """Return which cells of the powers (N, M), `windowed`, exceed their threshold, (N, M) bool.
+
+    Ranges wrap around.
 
     The threshold follows the `training` cells on either side, beyond the `guard` cells next to the
     cell: their mean, or the value that three quarters of them do not exceed. Behind a Hann window
@@ -141,9 +146,8 @@ def exceeds(settings: dict, power: np.ndarray) -> np.ndarray:
     if settings["cfar"] == "cell_averaging":
         weights = np.zeros(2 * reach + 1)
         weights[reach + used] = 1.0 / len(used)
-        return power > factor(len(used), settings["false_alarm"]) * convolve1d(
-            power, weights, mode="wrap"
-        )
+        mean = convolve1d(power, weights, mode="wrap")
+        return power > factor(len(used), settings["false_alarm"]) * mean
     rank = math.ceil(0.75 * len(used))
     scaled = ordered_factor(len(used), rank, settings["false_alarm"]) * power
     # A cell exceeds the rank-th smallest of these thresholds where it exceeds at least `rank` of
@@ -172,17 +176,17 @@ def choose(
     alpha = settings["gain"]
     beta = alpha * alpha / (2.0 - alpha)
     error_s = 2 * settings["range_error_m"] / SPEED_OF_LIGHT * rng.standard_normal()
-    place = (look.delay_s + error_s) / look.cell_s
+    predicted = (look.delay_s + error_s) / look.cell_s
     rate = 0.0
     result = np.empty(len(cells), np.int64)
     for n, powers in enumerate(allowed):
-        place += rate
-        middle = int(np.floor(place + 0.5))
+        predicted += rate
+        middle = int(np.floor(predicted + 0.5))
         best = int(powers[(middle + gate) % count].argmax())
         result[n] = middle % count
         if powers[(middle + gate[best]) % count] >= 0:
             result[n] = (middle + gate[best]) % count
-            off = middle + gate[best] - place
-            place += alpha * off
+            off = middle + gate[best] - predicted
+            predicted += alpha * off
             rate += beta * off
     return result

@@ -13,10 +13,8 @@ from lowalt.targets.cloud import Cloud
 
 SOURCE = (
     "Uhlenbeck & Ornstein, On the theory of the Brownian motion, 1930; exact joint steps of the "
-    "process and its "
-    "integral: Gillespie, Exact numerical simulation of the Ornstein-Uhlenbeck process and its "
-    "integral, 1996; "
-    "magnitudes: flight logs of multirotors, second-hand"
+    "process and its integral: Gillespie, Exact numerical simulation of the Ornstein-Uhlenbeck "
+    "process and its integral, 1996; magnitudes: flight logs of multirotors, second-hand"
 )
 DEFAULTS = {"spread": 0.05, "wander": 0.02, "correlation_s": 1.5}
 IDLE = [{"spread": 0, "wander": 0}]
@@ -26,8 +24,9 @@ JUMPS = True
 def perturb(
     settings: dict, cloud: Cloud, row: dict, times_s: np.ndarray, rng: np.random.Generator
 ) -> Perturbation:
-    """Return the turns (rad) added to each rotor at `times_s` (N,) s, equally spaced; nothing for
-    other targets.
+    """Return the turns (rad) added to each rotor at `times_s` (N,) s, equally spaced.
+
+    Nothing is returned for other targets.
 
     The spread's added turn is zero at time 0; the wander's is zero at the first of the times.
     """

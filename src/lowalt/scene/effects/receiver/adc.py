@@ -12,9 +12,9 @@ import numpy as np
 from lowalt.scene.waveform import Look
 
 SOURCE = (
-    "W. R. Bennett, Spectra of quantized signals, Bell Syst. Tech. J. 27(3), 1948; "
-    "A. Gersho, R. M. Gray, Vector Quantization and Signal Compression, 1992, ch. 5 (mid-rise "
-    "quantiser, overload)"
+    "W. R. Bennett, Spectra of quantized signals, Bell Syst. Tech. J. 27(3), 1948; A. Gersho, R. "
+    "M. Gray, Vector Quantization and Signal Compression, 1992, ch. 5 (mid-rise quantiser, "
+    "overload)"
 )
 DEFAULTS = {"bits": 12, "backoff_db": 12.0}
 IDLE = [{"bits": None}, {"bits": 0}]
@@ -26,16 +26,19 @@ def quantise(samples: np.ndarray, bits: int, full_scale: float) -> np.ndarray:
     A component outside the range is put in the outermost step. Source: Gersho and Gray 1992, ch. 5.
     """
     step = full_scale * 2.0 ** (1 - bits)
-    parts = np.ascontiguousarray(samples, np.complex128).view(np.float64)
-    code = np.clip(np.floor(parts / step), -(2.0 ** (bits - 1)), 2.0 ** (bits - 1) - 1)
+    components = np.ascontiguousarray(samples, np.complex128).view(np.float64)
+    half = 2.0 ** (bits - 1)
+    code = np.clip(np.floor(components / step), -half, half - 1)
     return ((code + 0.5) * step).view(np.complex128)
 
 
 def full_scale(samples: np.ndarray, backoff_db: float) -> float:
-    """Return the converter's range: a component's root mean square over the look, times the
-    back-off.
+    """Return the converter's range.
+
+    It is a component's root mean square over the look, times the back-off.
     """
-    return float(np.sqrt(np.mean(samples.real**2 + samples.imag**2) / 2)) * 10 ** (backoff_db / 20)
+    power = np.mean(samples.real**2 + samples.imag**2)
+    return float(np.sqrt(power / 2)) * 10 ** (backoff_db / 20)
 
 
 def receive(
@@ -46,4 +49,6 @@ def receive(
     A look of zeros stays zeros. Source: Bennett 1948; nothing is drawn.
     """
     scale = full_scale(samples, settings["backoff_db"])
-    return quantise(samples, settings["bits"], scale) if scale > 0 else samples
+    if scale == 0:
+        return samples
+    return quantise(samples, settings["bits"], scale)

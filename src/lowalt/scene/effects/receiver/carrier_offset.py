@@ -1,5 +1,6 @@
-"""Carrier offset: the receiver's oscillator is off its frequency, so every line moves and
-subcarriers leak.
+"""Carrier offset: the receiver's oscillator is off its frequency.
+
+Every line moves and subcarriers leak.
 """
 
 import numpy as np
@@ -11,9 +12,8 @@ from lowalt.scene.waveform import Look, oscillator_hz
 
 SOURCE = (
     "P. H. Moose, A technique for orthogonal frequency division multiplexing frequency offset "
-    "correction, "
-    "IEEE Trans. Commun. 42(10), 1994, Eqs. 1 to 4; default: 3 sigma at the 0.05 ppm of 3GPP TS "
-    "38.104, 6.5.1"
+    "correction, IEEE Trans. Commun. 42(10), 1994, Eqs. 1 to 4; default: 3 sigma at the 0.05 ppm "
+    "of 3GPP TS 38.104, 6.5.1"
 )
 DEFAULTS = {"fixed_ppm": 0.0, "sigma_ppm": 0.017}
 STREAM = "oscillator"
@@ -22,8 +22,9 @@ UNMODELLED = ("fmcw", "cw")
 
 
 def check(settings: dict, scene: CheckedScene) -> None:
-    """Raise InputError where transmitter and receiver share one oscillator, which has no offset
-    from itself.
+    """Raise InputError where transmitter and receiver share one oscillator.
+
+    An oscillator has no offset from itself.
     """
     offsets.check_oscillator("carrier_offset", scene)
 
@@ -31,8 +32,9 @@ def check(settings: dict, scene: CheckedScene) -> None:
 def receive(
     settings: dict, samples: np.ndarray, look: Look, rng: np.random.Generator
 ) -> np.ndarray:
-    """Return the samples (N, M) times exp(j 2 pi F t) at their absolute times t = n T_r + i / (M
-    df).
+    """Return the samples (N, M) times exp(j 2 pi F t).
+
+    t: their absolute times n T_r + i / (M df).
 
     F is positive where the receiver's oscillator is too low: all lines rise by F, and fold at half
     the symbol rate.

@@ -1,5 +1,6 @@
-"""White noise in all range cells at set SNRs, added before range compression: the strongest cell
-may be a wrong one.
+"""White noise in all range cells at set SNRs.
+
+It is added before range compression: the strongest cell may be a wrong one.
 
 The paper's SNRs say how far the noise is below the target in its range cell, which is then known.
 Here the same SNR holds in that cell, the other cells have as much noise, and cancellers and
@@ -18,9 +19,8 @@ from lowalt.scene.waveform import Look
 
 SOURCE = (
     "M. A. Richards, Fundamentals of Radar Signal Processing, 2nd ed. 2014, 6.2 (noise in all "
-    "range cells); S. M. Kay, "
-    "Fundamentals of Statistical Signal Processing II, 1998, 4.3 (matched-filter gain M of M "
-    "subcarriers)"
+    "range cells); S. M. Kay, Fundamentals of Statistical Signal Processing II, 1998, 4.3 "
+    "(matched-filter gain M of M subcarriers)"
 )
 DEFAULTS = {"snr_db": None}
 IDLE = [{"snr_db": math.inf}]
@@ -36,16 +36,18 @@ def check(settings: dict, scene: CheckedScene) -> None:
         )
     if settings["snr_db"] is not None and scene.snr_db != (math.inf,):
         raise InputError(
-            f"effects.cell_noise: snr_db is {settings['snr_db']} and noise.snr_db {list(scene.snr_db)}, expected "
-            "noise.snr_db [.inf] together with a number, or snr_db null for those of noise.snr_db"
+            f"effects.cell_noise: snr_db is {settings['snr_db']} and noise.snr_db "
+            f"{list(scene.snr_db)}, expected noise.snr_db [.inf] together with a number, or snr_db "
+            "null for those of noise.snr_db"
         )
 
 
 def receive(
     settings: dict, samples: np.ndarray, look: Look, rng: np.random.Generator
 ) -> np.ndarray:
-    """Return samples (N, M) plus circular white Gaussian noise, `snr_db` below the target's echo in
-    each range cell.
+    """Return samples (N, M) plus circular white Gaussian noise.
+
+    It is `snr_db` below the target's echo in each range cell.
 
     A range cell is the mean of M subcarriers and each of these the sum of M samples, so a sample
     has a cell's noise. Nothing is added while snr_db is null: the scene gives each of noise.snr_db

@@ -1,5 +1,6 @@
-"""Sampling-clock offset: the converter's clock runs fast or slow against the one that made the
-symbols.
+"""Sampling-clock offset: the converter's clock runs fast or slow.
+
+It is compared with the clock that made the symbols.
 
 Sample instants shrink within a symbol, and the window slips from symbol to symbol, so ranges drift:
 by c n T_r e / 2 until symbol n, where e is the relative error of the clock.
@@ -18,8 +19,8 @@ from lowalt.scene.waveform import Look
 
 SOURCE = (
     "T. Pollet, P. Spruyt, M. Moeneclaey, The BER performance of OFDM systems using "
-    "non-synchronized sampling, "
-    "IEEE GLOBECOM 1994; default: 3 sigma at the 0.05 ppm of 3GPP TS 38.104, 6.5.1"
+    "non-synchronized sampling, IEEE GLOBECOM 1994; default: 3 sigma at the 0.05 ppm of 3GPP TS "
+    "38.104, 6.5.1"
 )
 DEFAULTS = {"fixed_ppm": 0.0, "sigma_ppm": 0.017, "prefix_slack_s": 2.9e-7}
 STREAM = "oscillator"
@@ -31,23 +32,26 @@ ROUNDING = 1e-14
 
 
 def check(settings: dict, scene: CheckedScene) -> None:
-    """Raise InputError for another oscillator than the carrier's, or a slip beyond the cyclic
-    prefix in the look.
+    """Raise InputError for another oscillator than the carrier's, or too large a slip.
+
+    The slip must stay within the cyclic prefix in the look.
     """
     offsets.check_oscillator("clock_offset", scene)
     carrier = scene.effects.get("carrier_offset")
     for key in ("fixed_ppm", "sigma_ppm"):
         if carrier and carrier[key] != settings[key]:
             raise InputError(
-                f"effects.clock_offset: {key} is {settings[key]} and effects.carrier_offset has {carrier[key]}, "
-                "expected the same: carrier and sampling clock come from one oscillator"
+                f"effects.clock_offset: {key} is {settings[key]} and effects.carrier_offset has "
+                f"{carrier[key]}, expected the same: carrier and sampling clock come from one "
+                "oscillator"
             )
     network = scene.network
     timing = scene.effects.get("timing_offset")
     rate = 1e-6 * offsets.largest(settings["fixed_ppm"], settings["sigma_ppm"])
     slip_s = rate * network.symbols * network.symbol_interval_s
-    # A window that is late as well slips from there.
-    slip_s += offsets.largest(timing["fixed_s"], timing["sigma_s"]) if timing else 0.0
+    if timing:
+        # A window that is late as well slips from there.
+        slip_s += offsets.largest(timing["fixed_s"], timing["sigma_s"])
     offsets.check_slip("clock_offset", slip_s, settings["prefix_slack_s"])
 
 
@@ -70,13 +74,13 @@ def receive(
     term = offsets.turned(fft.fft(samples, axis=-1), np.outer(instants, shift_hz))
     result = fft.ifft(term, axis=-1)
     step = 2 * np.pi * look.sample_s * shift_hz
-    place = np.arange(samples.shape[1]) - middle
-    size = reach = float(abs(step).max() * abs(place).max())
+    away = np.arange(samples.shape[1]) - middle
+    size = reach = float(abs(step).max() * abs(away).max())
     order = 1
     while size * math.exp(reach) > ROUNDING:
-        # exp(j step place) is the sum over k of (j step)^k place^k / k!.
+        # exp(j step away) is the sum over k of (j step)^k away^k / k!.
         term = term * (1j * step / order)
-        result += fft.ifft(term, axis=-1) * place.astype(float) ** order
+        result += fft.ifft(term, axis=-1) * away.astype(float) ** order
         order += 1
         size *= reach / order
     return result

@@ -1,5 +1,6 @@
-"""IQ imbalance: the two branches of a direct-conversion mixer differ, so every subcarrier gains its
-mirror's image.
+"""IQ imbalance: the two branches of a direct-conversion mixer differ.
+
+Every subcarrier gains its mirror's image.
 """
 
 import numpy as np
@@ -8,16 +9,16 @@ from lowalt.scene.waveform import Look
 
 SOURCE = (
     "T. Schenk, RF Imperfections in High-rate Wireless Systems: Impact and Digital Compensation, "
-    "Springer 2008, ch. 5 "
-    "(frequency-independent IQ mismatch)"
+    "Springer 2008, ch. 5 (frequency-independent IQ mismatch)"
 )
 DEFAULTS = {"gain_db": 0.5, "phase_deg": 2.0}
 IDLE = [{"gain_db": 0, "phase_deg": 0}]
 
 
 def coefficients(settings: dict) -> tuple[complex, complex]:
-    """Return mu and nu of r -> mu r + nu conj(r), for a Q branch of gain g that lags quadrature by
-    phi.
+    """Return mu and nu of r -> mu r + nu conj(r).
+
+    They are those of a Q branch of gain g that lags quadrature by phi.
 
     mu = (1 + g exp(-j phi)) / 2, nu = (1 - g exp(j phi)) / 2; the image rejection ratio is |mu|^2 /
     |nu|^2.
@@ -29,8 +30,9 @@ def coefficients(settings: dict) -> tuple[complex, complex]:
 def receive(
     settings: dict, samples: np.ndarray, look: Look, rng: np.random.Generator
 ) -> np.ndarray:
-    """Return mu r + nu conj(r) of the samples r (N, M); the mirror is the oscillator's, at
-    subcarrier M // 2.
+    """Return mu r + nu conj(r) of the samples r (N, M).
+
+    The mirror is the oscillator's, at subcarrier M // 2.
 
     Source: Schenk 2008, ch. 5; nothing is drawn.
     """

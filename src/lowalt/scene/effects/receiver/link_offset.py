@@ -16,10 +16,8 @@ from lowalt.scene.waveform import Look, oscillator_hz
 
 SOURCE = (
     "P. H. Moose, IEEE Trans. Commun. 42(10), 1994 (carrier); M. Speth et al., IEEE Trans. Commun. "
-    "47(11), 1999 "
-    "(time); defaults: 3 sigma at the 0.05 ppm of 3GPP TS 38.104, 6.5.1, and clocks disciplined to "
-    "20 ns by "
-    "satellites: estimate"
+    "47(11), 1999 (time); defaults: 3 sigma at the 0.05 ppm of 3GPP TS 38.104, 6.5.1, and clocks "
+    "disciplined to 20 ns by satellites: estimate"
 )
 DEFAULTS = {"sigma_ppm": 0.017, "sigma_s": 2e-8}
 DRAWN = "look"
@@ -43,12 +41,10 @@ def receive(
     A sender whose frequency is higher by F raises all lines by F; a sender whose clock is late
     makes all echoes late. The samples of a station that receives its own signal stay as they are.
     """
-    late_s, rise_hz = _of(settings, look.network, look.station, rng)
-    return (
-        samples
-        if look.station.transmitter is None
-        else risen(delayed(samples, late_s, look), rise_hz, look)
-    )
+    if look.station.transmitter is None:
+        return samples
+    late_s, rise_hz = map(float, _of(settings, look.network, look.station, rng))
+    return risen(delayed(samples, late_s, look), rise_hz, look)
 
 
 def displaced(settings: dict, view: View, rng: np.random.Generator) -> Displacement:
@@ -59,8 +55,9 @@ def displaced(settings: dict, view: View, rng: np.random.Generator) -> Displacem
 def _of(
     settings: dict, network: Network, station: Station, rng: np.random.Generator
 ) -> Displacement:
-    """The errors of the sender minus those of the receiver; zero for a station that receives its
-    own signal.
+    """Return the errors of the sender minus those of the receiver.
+
+    They are zero for a station that receives its own signal.
     """
     sends = station.transmitter
     hears = station.receiver

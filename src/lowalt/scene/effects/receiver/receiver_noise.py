@@ -1,5 +1,6 @@
-"""Thermal noise of the receiver from a link budget, before range compression: the strongest cell
-may be a wrong one.
+"""Thermal noise of the receiver from a link budget.
+
+It acts before range compression: the strongest cell may be a wrong one.
 """
 
 import numpy as np
@@ -12,8 +13,8 @@ from lowalt.scene.waveform import Look
 
 SOURCE = (
     "H. T. Friis, Noise Figures of Radio Receivers, Proc. IRE 32(7), 1944, Eqs. 1 and 8 (noise k T "
-    "B F); "
-    "S. M. Kay, Fundamentals of Statistical Signal Processing II, 1998, 4.3 (matched-filter gain)"
+    "B F); S. M. Kay, Fundamentals of Statistical Signal Processing II, 1998, 4.3 (matched-filter "
+    "gain)"
 )
 DEFAULTS = {"noise_figure_db": 7.0, "temperature_k": 290.0}
 IDLE = [{"temperature_k": 0}]
@@ -26,14 +27,15 @@ def check(settings: dict, scene: CheckedScene) -> None:
     """Raise InputError for noise at set SNRs as well."""
     if scene.noisy:
         raise InputError(
-            f"effects.receiver_noise: noise.snr_db is {list(scene.snr_db)}, expected [.inf]: a scene has a link budget "
-            "or set SNRs, not both"
+            f"effects.receiver_noise: noise.snr_db is {list(scene.snr_db)}, expected [.inf]: a "
+            "scene has a link budget or set SNRs, not both"
         )
 
 
 def noise_w(settings: dict, network: Network) -> float:
-    """Return the noise power k T B F (W) of one subcarrier; a range cell, the mean of M of them,
-    has 1/M of it.
+    """Return the noise power k T B F (W) of one subcarrier.
+
+    A range cell, the mean of M of them, has 1/M of it.
     """
     bandwidth_hz = network.noise_bandwidth_hz
     factor = 10 ** (settings["noise_figure_db"] / 10)
@@ -43,8 +45,9 @@ def noise_w(settings: dict, network: Network) -> float:
 def receive(
     settings: dict, samples: np.ndarray, look: Look, rng: np.random.Generator
 ) -> np.ndarray:
-    """Return the samples (N, M) plus circular white Gaussian noise of power k T df F per
-    subcarrier.
+    """Return the samples (N, M) plus circular white Gaussian noise.
+
+    Its power is k T df F per subcarrier.
 
     A subcarrier is the sum of M samples, and a range cell is the mean of M subcarriers, so a sample
     and a cell both have 1/M of the noise of a subcarrier. In an FMCW sweep a sample takes the place

@@ -14,8 +14,8 @@ from lowalt.scene.waveform import Look
 
 SOURCE = (
     "M. Speth, S. A. Fechtel, G. Fock, H. Meyr, Optimum receiver design for wireless broad-band "
-    "systems using OFDM I, "
-    "IEEE Trans. Commun. 47(11), 1999 (window offset inside the guard interval is a linear phase)"
+    "systems using OFDM I, IEEE Trans. Commun. 47(11), 1999 (window offset inside the guard "
+    "interval is a linear phase)"
 )
 DEFAULTS = {"fixed_s": 0.0, "sigma_s": 2e-8, "prefix_slack_s": 2.9e-7}
 IDLE = [{"fixed_s": 0, "sigma_s": 0}]
@@ -31,8 +31,9 @@ def check(settings: dict, scene: CheckedScene) -> None:
 def receive(
     settings: dict, samples: np.ndarray, look: Look, rng: np.random.Generator
 ) -> np.ndarray:
-    """Return samples (N, M) of a window that starts late by d: subcarrier m turns by exp(j 2 pi (m
-    - M // 2) df d).
+    """Return samples (N, M) of a window that starts late by d.
+
+    Subcarrier m then turns by exp(j 2 pi (m - M // 2) df d).
 
     A late window makes all echoes appear nearer by c d / 2. The phase of the oscillator does not
     change.

@@ -1,5 +1,6 @@
-"""Transmit leakage: the station's own signal reaches its receiver directly, and fills the
-converter's range.
+"""Transmit leakage: the station's own signal reaches its receiver directly.
+
+It fills the converter's range.
 
 The leakage stands still in range cell 0. It comes after the oscillator's effects: a station that
 sends and receives by one oscillator hears its own signal after nanoseconds, so phase noise cancels
@@ -16,8 +17,7 @@ from lowalt.scene.waveform import Look, transmit
 
 SOURCE = (
     "A. Sabharwal et al., In-band full-duplex wireless: challenges and opportunities, IEEE J. Sel. "
-    "Areas Commun. "
-    "32(9), 2014; 80 dB by separate panels and analogue cancellation: estimate"
+    "Areas Commun. 32(9), 2014; 80 dB by separate panels and analogue cancellation: estimate"
 )
 DEFAULTS = {"isolation_db": 80.0, "delay_s": 0.0}
 IDLE = [{"isolation_db": None}]
@@ -27,13 +27,15 @@ STILL = True
 
 def check(settings: dict, scene: CheckedScene) -> None:
     """Raise InputError where the receiver has an oscillator of its own."""
-    apart = [name for name in ("carrier_offset", "clock_offset") if name in scene.effects]
+    apart: list[str] = [
+        name for name in ("carrier_offset", "clock_offset") if name in scene.effects
+    ]
     if not scene.effects.get("phase_noise", {"shared": True})["shared"]:
         apart.append("phase_noise with shared: false")
     if apart:
         raise InputError(
-            f"effects.transmit_leakage: {apart} give the receiver an oscillator of its own, expected the transmitter's "
-            "for leakage, in which offsets and phase noise cancel"
+            f"effects.transmit_leakage: {apart} give the receiver an oscillator of its own, "
+            "expected the transmitter's for leakage, in which offsets and phase noise cancel"
         )
 
 
@@ -46,8 +48,9 @@ def levels(settings: dict, view: View) -> list[tuple[str, float, str]]:
 def receive(
     settings: dict, samples: np.ndarray, look: Look, rng: np.random.Generator
 ) -> np.ndarray:
-    """Return samples (N, M) plus the sent waveform, `isolation_db` below its power, with a drawn
-    constant phase.
+    """Return samples (N, M) plus the sent waveform, `isolation_db` below its power.
+
+    Its phase is drawn and constant.
 
     The leakage of a subcarrier is `isolation_db` below its transmit power. One draw per sample and
     station.

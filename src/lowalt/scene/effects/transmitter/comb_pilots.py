@@ -1,5 +1,6 @@
-"""Comb pilots: only every K-th subcarrier carries known symbols, so ranges repeat after M / K
-cells.
+"""Comb pilots: only every K-th subcarrier carries known symbols.
+
+Ranges then repeat after M / K cells.
 
 The range cells of a comb are as long as those of the whole band; there are M / K of them, and
 farther echoes fold into them. A cell is the mean of M / K subcarriers, so its noise is 10 lg K
@@ -12,22 +13,27 @@ from scipy import fft
 from lowalt.files.errors import InputError
 from lowalt.scene.checks import CheckedScene
 
-SOURCE = "3GPP TS 38.211, 7.4.1.5 and 7.4.1.7 (reference signals on combs); C. Sturm, W. Wiesbeck, Proc. IEEE 99(7), 2011"
+SOURCE = (
+    "3GPP TS 38.211, 7.4.1.5 and 7.4.1.7 (reference signals on combs); C. Sturm, W. Wiesbeck, "
+    "Proc. IEEE 99(7), 2011"
+)
 DEFAULTS = {"spacing": 4, "offset": 0}
 IDLE = [{"spacing": 1}]
 UNMODELLED = ("fmcw", "cw")
 
 
 def check(settings: dict, scene: CheckedScene) -> None:
-    """Raise InputError for a comb that does not divide the band, or an offset beyond its first
-    tooth.
+    """Raise InputError for a comb that does not divide the band.
+
+    Raise it also for an offset beyond its first tooth.
     """
     count = scene.network.subcarriers
     spacing = settings["spacing"]
     offset = settings["offset"]
     if count % spacing or count == spacing:
         raise InputError(
-            f"effects.comb_pilots.spacing: {spacing}, expected a proper divisor of {count} subcarriers"
+            f"effects.comb_pilots.spacing: {spacing}, expected a proper divisor of {count} "
+            "subcarriers"
         )
     if offset >= spacing:
         raise InputError(

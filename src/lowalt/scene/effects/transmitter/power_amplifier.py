@@ -1,5 +1,6 @@
-"""Power amplifier that saturates: the waveform is compressed, so subcarriers lose amplitude and
-disturb each other.
+"""Power amplifier that saturates: the waveform is compressed.
+
+Subcarriers lose amplitude and disturb each other.
 
 The amplifier has no memory and no phase distortion: an amplitude a, relative to saturation, becomes
 a / (1 + a^4)^(1/4). It acts on the OFDM symbol's time signal, sampled four times as often as the
@@ -15,8 +16,7 @@ from scipy import fft
 
 SOURCE = (
     "C. Rapp, Effects of HPA-nonlinearity on a 4-DPSK/OFDM-signal for a digital sound broadcasting "
-    "system, ESA SP-332, "
-    "1991; smoothness 2 of a solid-state amplifier, and back-off: estimate"
+    "system, ESA SP-332, 1991; smoothness 2 of a solid-state amplifier, and back-off: estimate"
 )
 DEFAULTS = {"backoff_db": 8.0}
 IDLE = [{"backoff_db": None}]
@@ -26,8 +26,9 @@ OVERSAMPLING = 4
 
 
 def rapp(samples: np.ndarray, saturation: float) -> np.ndarray:
-    """Return amplified samples (any shape), of gain one at small amplitudes and at most
-    `saturation` A.
+    """Return amplified samples (any shape).
+
+    The gain is one at small amplitudes, and samples reach at most `saturation` A.
 
     Source: Rapp 1991: g(a) = a / (1 + (a / A)^(2p))^(1/(2p)) with p = 2.
     """
@@ -36,8 +37,9 @@ def rapp(samples: np.ndarray, saturation: float) -> np.ndarray:
 
 
 def aired(settings: dict, sent: np.ndarray) -> np.ndarray:
-    """Return the subcarriers (N, M) that are on the air when the data `sent` (N, M), of mean power
-    one, are amplified.
+    """Return the subcarriers (N, M) that are on the air when the data `sent` are amplified.
+
+    sent: (N, M), of mean power one.
 
     Saturation is at `backoff_db` over the signal's mean power. Subcarriers stand around the
     oscillator at M // 2.

@@ -1,5 +1,4 @@
-"""Slow time as real frames have it: symbols in downlink slots only, some missing, none exactly on
-time.
+"""Slow time as real frames have it: symbols in downlink slots only, some missing or late.
 
 A station sends sensing symbols in the downlink part of each TDD period. Some of them are missing,
 and each may be sent up to `jitter_s` later than its nominal instant. `regrid` says how the received
@@ -18,9 +17,8 @@ from lowalt.scene.view import Sampling
 
 SOURCE = (
     "3GPP TS 38.331, TDD-UL-DL-Pattern (periods of 0.5 to 10 ms); non-uniform transform: F. "
-    "Marvasti (ed.), Nonuniform "
-    "Sampling, 2001, ch. 1; spectra of missing samples: P. Stoica, R. Moses, Spectral Analysis of "
-    "Signals, 2005, 2.4"
+    "Marvasti (ed.), Nonuniform Sampling, 2001, ch. 1; spectra of missing samples: P. Stoica, R. "
+    "Moses, Spectral Analysis of Signals, 2005, 2.4"
 )
 DEFAULTS = {
     "tdd_period_s": 0.01,
@@ -36,18 +34,21 @@ FEWEST = 2
 
 
 def check(settings: dict, scene: CheckedScene) -> None:
-    """Raise InputError for a jitter beyond the next symbol, a look without symbols, or set SNRs
-    with gaps.
+    """Raise InputError for a jitter beyond the next symbol, too few symbols, or noise in gaps.
+
+    Noise at set SNRs would fill the gaps of a look.
     """
     step = scene.network.symbol_interval_s
     if settings["jitter_s"] >= step:
         raise InputError(
-            f"effects.slow_time.jitter_s: {settings['jitter_s']}, expected below the symbol interval {step}"
+            f"effects.slow_time.jitter_s: {settings['jitter_s']}, expected below the symbol "
+            f"interval {step}"
         )
     if _in_downlink(settings, scene.network).sum() < FEWEST:
         raise InputError(
-            f"effects.slow_time: downlink {settings['downlink']} of a period of {settings['tdd_period_s']} s holds "
-            f"fewer than {FEWEST} of {scene.network.symbols} symbols, expected more"
+            f"effects.slow_time: downlink {settings['downlink']} of a period of "
+            f"{settings['tdd_period_s']} s holds fewer than {FEWEST} of {scene.network.symbols} "
+            "symbols, expected more"
         )
     if scene.known_times and even(settings):
         raise InputError(
@@ -77,8 +78,9 @@ def even(settings: dict) -> bool:
 
 
 def _in_downlink(settings: dict, network: Network) -> np.ndarray:
-    """Whether each symbol's nominal instant (N,) lies in the downlink part, which begins every
-    period.
+    """Whether each symbol's nominal instant (N,) lies in the downlink part.
+
+    That part begins every period.
     """
     phase = network.times_s / settings["tdd_period_s"]
     # Instants that are multiples of the period must not fall before it by rounding.
@@ -100,17 +102,17 @@ def sampling(settings: dict, network: Network, rng: np.random.Generator) -> Samp
 
 
 def regridded(settings: dict, signal: np.ndarray, timing: Sampling, network: Network) -> np.ndarray:
-    """Return the evenly spaced signal (N,) made of received symbols `signal` (K,), K of them
-    present.
+    """Return the evenly spaced signal (N,) made of received symbols `signal` (K,).
+
+    K of all symbols are present.
 
     zero: each symbol at its nominal instant, zeros in the gaps. nudft: the evenly spaced signal
     whose N Fourier coefficients are the sums over symbols at their true instants.
     """
     if settings["regrid"] == "nudft":
         frequency = np.fft.fftfreq(network.symbols, network.symbol_interval_s)
-        sine, cosine = portable.sine_cosine_turns(
-            np.outer(frequency, timing.times_s[timing.present])
-        )
+        turns = np.outer(frequency, timing.times_s[timing.present])
+        sine, cosine = portable.sine_cosine_turns(turns)
         real = portable.dot(cosine, signal.real) + portable.dot(sine, signal.imag)
         imag = portable.dot(cosine, signal.imag) - portable.dot(sine, signal.real)
         return np.fft.ifft(real + 1j * imag)

@@ -1,0 +1,118 @@
+"""What a configuration that may be a stranger's cannot choose: code, weights, files elsewhere.
+
+A configuration file counts as a run's, and so perhaps as a stranger's, if its name is config.yaml,
+if it holds every key that a whole configuration needs, or if it stands beside the files of a run or
+a data set. Any other file is an overlay, which its user writes, or reads before use as one reads a
+script.
+"""
+
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+
+from lowalt.config.named_code import allowed, file_of, own_effects
+from lowalt.files.csv_tables import read_csv
+from lowalt.files.errors import InputError, shown
+from lowalt.files.shipped import SHIPPED, shipped
+
+NAME = "config.yaml"
+"""Name of a run's configuration."""
+BESIDE = ("index.json", "shards/index.json", "model.safetensors", "SHA256SUMS")
+"""Files of a run or of a data set; a configuration in their folder came with them."""
+OF_TRAINING = ("recognition", "report")
+"""Blocks of a configuration that making samples does not use."""
+OVERLAY = "an overlay of your own that names it"
+ADVICE = f"which a file may not choose; expected {OVERLAY}"
+
+
+def is_of_run(path: Path, content: Mapping, required: Iterable[str]) -> bool:
+    """Return whether a configuration file counts as a run's.
+
+    content: what it holds; required: the keys that a whole configuration has.
+    """
+    real = path.resolve()
+    if NAME in (path.name, real.name) or set(required) <= set(content):
+        return True
+    return any((real.parent / name).exists() for name in BESIDE)
+
+
+def refuse_brought(settings: Mapping, where: str | Path) -> None:
+    """Refuse settings of what may be a stranger's file if a text in them names code, or a file or
+    folder that lies neither below the working directory nor beside `where` nor in the package.
+
+    No code is run and no file is opened. Links count as what they lead to.
+    Raises: InputError naming the key and the text.
+    """
+    for key, text in _texts(settings):
+        if own_effects([text]) or file_of(text) is not None:
+            kind = "effect" if key == "effects" else key.rpartition(".")[2]
+            raise InputError(f"{where}: its {kind} {text!r} is code, {ADVICE}")
+        if _leads_elsewhere(text, Path(where).parent):
+            raise InputError(
+                f"{where}: {key} is {shown(text)}, a place outside of this folder, {ADVICE}"
+            )
+
+
+def refuse_weights(weights: object, where: str | Path, how: str) -> None:
+    """Refuse weights that a training would read from a file or ask a hub for.
+
+    how: what the user may do instead. Raises: InputError naming them.
+    """
+    if weights != "none":
+        raise InputError(
+            f"{where}: its weights {shown(weights)} come from elsewhere, which a file may not choose; "
+            f"expected {how}"
+        )
+
+
+def refuse_training(settings: Mapping, where: str | Path, how: str = OVERLAY) -> None:
+    """Refuse settings of what may be a stranger's file whose networks begin with other weights than
+    random ones, or whose table of schemes names code.
+
+    how: what the user may do instead. Raises: InputError naming the weights or the code.
+    """
+    block = settings.get("recognition")
+    if not isinstance(block, Mapping):
+        return
+    network = block.get("network")
+    if isinstance(network, Mapping) and "weights" in network:
+        refuse_weights(network["weights"], where, how)
+    table = block.get("table")
+    if isinstance(table, str) and shipped(table).is_file():
+        for row in read_csv(shipped(table), "backbone"):
+            allowed(row["backbone"], "", where, how)
+
+
+def _texts(settings: Mapping) -> Iterator[tuple[str, str]]:
+    """Yield every text in nested mappings and lists, keys too, with the dotted key under which it
+    stands.
+    """
+    waiting: list[tuple[str, object]] = [("", settings)]
+    while waiting:
+        key, value = waiting.pop()
+        if isinstance(value, str):
+            yield key, value
+        elif isinstance(value, Mapping):
+            for name, item in value.items():
+                waiting.append((key, name))
+                waiting.append((f"{key}.{name}".lstrip("."), item))
+        elif isinstance(value, (list, tuple)):
+            for item in value:
+                waiting.append((key, item))
+
+
+def _leads_elsewhere(text: str, folder: Path) -> bool:
+    """Whether a text is the path of something outside of the working directory, a folder and the
+    package.
+    """
+    path = Path(text)
+    if ".." in path.parts:
+        return True
+    try:
+        if not path.is_absolute() and not path.exists() and not path.is_symlink():
+            return False
+        real = path.resolve()
+        inside = [root.resolve() for root in (Path.cwd(), folder, SHIPPED)]
+    except (OSError, ValueError, RuntimeError):
+        # No file can have this name, or links lead around in a circle.
+        return path.is_absolute()
+    return not any(real.is_relative_to(root) for root in inside)
