@@ -152,7 +152,7 @@ def holders(locks: Path, living: bool = False) -> list[str]:
     return lines
 
 
-def refusal(locks: Path) -> str:
+def locked_message(locks: Path) -> str:
     """Return one line about the holders of the locks of a folder and what the user can do."""
     away = "if nothing of this runs any more: snakemake --unlock"
     return f"the working directory is locked: {'; '.join([*holders(locks), away])}"
