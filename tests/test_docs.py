@@ -15,14 +15,12 @@ import tomllib
 from importlib.metadata import packages_distributions
 from pathlib import Path
 
-import benchmark_picture
 import pytest
 import yaml
 from key_pages import configuration_page, effects_page
 
 from lowalt.__main__ import main
 from lowalt.config.layers import load, overlaid
-from lowalt.extensions.benchmark import baseline_table
 from lowalt.files.errors import InputError, install_command
 from lowalt.scene.effects import PLACES
 from pages import browsed
@@ -435,14 +433,6 @@ def test_a_window_of_1280_pixels_shows_every_tab_and_the_benchmark_s_tables_sort
     assert len(numbers) > 9 and numbers == sorted(numbers)
     # A cell is one line.
     assert height < 50
-
-
-def test_the_picture_of_the_benchmark_is_that_of_the_kept_table():
-    rows = baseline_table.read()
-    for name, narrow in (("benchmark.svg", False), ("benchmark-narrow.svg", True)):
-        assert (ROOT / "docs/pictures" / name).read_text() == benchmark_picture.picture(
-            rows, narrow
-        )
 
 
 def test_every_page_of_the_site_exists_and_every_page_is_in_the_site():

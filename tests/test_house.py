@@ -213,8 +213,8 @@ def tokens(text: str) -> int:
 
 
 TOKENS = {
-    "files": 4466,
-    "machine": 2994,
+    "files": 5_342,
+    "machine": 3_401,
     "numerics": 9630,
     "config": 7_902,
     "targets": 45724,
@@ -233,7 +233,7 @@ TOKENS = {
     "extensions/benchmark": 12325,
     "extensions/drafting": 27658,
     "extensions/formats": 2_307,
-    "extensions/recordings": 31329,
+    "extensions/recordings": 33_201,
     "extensions/town": 22928,
 }
 """Tokens of each room and extension. A commit that needs more than SLACK above it raises its figure

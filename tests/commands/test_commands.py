@@ -259,7 +259,7 @@ def test_predict_names_the_classes_by_their_probability(tmp_path, capsys):
 def test_report_asks_the_workflow_for_the_page_of_the_same_run(tmp_path, monkeypatch, capsys):
     asked = []
 
-    def snakemake(line):
+    def snakemake(line, **_):
         overlay = line[line.index("--configfile") + 1 :]
         asked.append(
             (load([*overlay[: overlay.index("--")]], SCHEMA), overlay[overlay.index("--") + 1 :])

@@ -145,7 +145,7 @@ def test_spectra_answers_with_the_size_of_each(answer, capsys):
 def snakemake(code, jobs=()):
     """In the place of Snakemake: note planned jobs, leave a run's state behind, end with a status."""
 
-    def run(line, stdout=None, env=None):
+    def run(line, stdout=None, env=None, **_):
         assert stdout == 2
         Path(env[PLANNED_JOBS]).write_text("".join(json.dumps(job) + "\n" for job in jobs))
         board = Board({"clouds": 2}, 1.0)
