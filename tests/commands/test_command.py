@@ -66,7 +66,10 @@ def test_a_path_that_the_system_refuses_is_named_in_one_line(tmp_path, monkeypat
         and said.startswith(f"error: {file}/below: Not a directory")
         and said.count("\n") == 1
     )
-    assert error_sentence(OSError(errno.ENOSPC, "no space", "a")) == "a: no space, expected room to write"
+    assert (
+        error_sentence(OSError(errno.ENOSPC, "no space", "a"))
+        == "a: no space, expected room to write"
+    )
     with pytest.raises(OSError, match="broken"):
         error_sentence(OSError(errno.EIO, "broken", "file"))
 
