@@ -29,17 +29,17 @@ MOVING_SHARE = 0.62
 
 def fault(record: dict) -> str | None:
     """Return the reason why a merged record is no bird, or None."""
-    f = figures_si(record)
-    long = f["bill"] + f["head"] + f["neck"] + f["tail"]
+    figures = figures_si(record)
+    long = figures["bill"] + figures["head"] + figures["neck"] + figures["tail"]
     if long > 0.9:
         return (
             f"figures bill, head, neck and tail add up to {long:.3g} of the length, expected at "
             "most 0.9"
         )
-    if f["span"] / f["length"] <= 2 * f["body_width"]:
-        return f"figures.span is {f['span']:.3g} m, expected more than twice the body's width"
-    if not 0.1 <= f["wrist"] <= 0.9:
-        return f"figures.wrist is {f['wrist']}, expected 0.1 to 0.9 of the wing"
+    if figures["span"] / figures["length"] <= 2 * figures["body_width"]:
+        return f"figures.span is {figures['span']:.3g} m, expected more than twice the body's width"
+    if not 0.1 <= figures["wrist"] <= 0.9:
+        return f"figures.wrist is {figures['wrist']}, expected 0.1 to 0.9 of the wing"
     return None
 
 
@@ -53,15 +53,15 @@ def _bill(front: float, root: float, depth: float) -> Surface:
     return loft(np.array(sections), tips=np.array([[0, root, 0], [0, front, -0.2 * depth]]))
 
 
-def _body(length: float, f: dict) -> tuple[Surface, ...]:
+def _body(length: float, figures: dict) -> tuple[Surface, ...]:
     """Bill, head, neck, trunk and tail fan: bill tip at +length/2, tail tip at -length/2."""
     front = length / 2
-    bill = f["bill"] * length
-    head = f["head"] * length
-    neck = f["neck"] * length
-    tail = f["tail"] * length
-    half = f["body_width"] * length / 2
-    fan_half = f["tail_spread"] * length / 2
+    bill = figures["bill"] * length
+    head = figures["head"] * length
+    neck = figures["neck"] * length
+    tail = figures["tail"] * length
+    half = figures["body_width"] * length / 2
+    fan_half = figures["tail_spread"] * length / 2
     thin = 0.03 * length
     skull_y = front - bill - 0.45 * head
     skull = ellipsoid((0.42 * head, 0.55 * head, 0.45 * head), (0, skull_y, 0))
@@ -92,7 +92,7 @@ def _body(length: float, f: dict) -> tuple[Surface, ...]:
         (-front, 0.86 * fan_half, 0.1),
     )
     fan = hull([(y, w, -h * thin, h * thin) for y, w, h in feathers], exponent=3.0)
-    hooked = _bill(front, front - bill - 0.2 * head, f["bill_depth"] * length)
+    hooked = _bill(front, front - bill - 0.2 * head, figures["bill_depth"] * length)
     return hooked, skull, throat, trunk, fan
 
 
@@ -104,7 +104,7 @@ def _inner(shoulder: np.ndarray, wrist: np.ndarray, chord: float) -> Surface:
     return foil([root, (*middle, 0.98 * chord, 0.05), (*wrist, 0.95 * chord, 0.04)], 0.11)
 
 
-def _outer(wrist: np.ndarray, half_span: float, chord: float, f: dict) -> tuple[Surface, ...]:
+def _outer(wrist: np.ndarray, half_span: float, chord: float, figures: dict) -> tuple[Surface, ...]:
     """The outer segment of the right wing.
 
     It is pointed, or blunt with slotted primaries spread like fingers.
@@ -112,8 +112,8 @@ def _outer(wrist: np.ndarray, half_span: float, chord: float, f: dict) -> tuple[
     x, y, z = wrist
     reach = half_span - x
     back = 0.2 * chord
-    fingers = int(f["fingers"])
-    tip = f["tip_chord"] * chord
+    fingers = int(figures["fingers"])
+    tip = figures["tip_chord"] * chord
     # Position from the wrist to the tip, and chord over that at the root.
     plan = [(0, 0.95), (0.35, 0.81), (0.7, 0.57), (0.92, 0.28)]
     if fingers:
@@ -143,17 +143,17 @@ def parts(record: dict) -> tuple[list[Part], dict]:
 
     The facts, `flap` and `wing_span_m`, are for the cloud's record.
     """
-    f = figures_si(record)
+    figures = figures_si(record)
     length = record["published"]["size_m"]
-    half_span = length * f["span"] / f["length"] / 2
-    body_half = f["body_width"] * length / 2
-    forward = (0.5 - f["bill"] - f["head"] - f["neck"] - 0.12) * length
+    half_span = length * figures["span"] / figures["length"] / 2
+    body_half = figures["body_width"] * length / 2
+    forward = (0.5 - figures["bill"] - figures["head"] - figures["neck"] - 0.12) * length
     shoulder = np.array([0.55 * body_half, forward, 0.45 * body_half])
-    chord = f["wing_chord"] * half_span
-    wrist = shoulder + np.array([f["wrist"] * (half_span - shoulder[0]), 0.35 * chord, 0])
+    chord = figures["wing_chord"] * half_span
+    wrist = shoulder + np.array([figures["wrist"] * (half_span - shoulder[0]), 0.35 * chord, 0])
     inner_right = _inner(shoulder, wrist, chord)
-    outer_right = _outer(wrist, half_span, chord, f)
-    result = [Part("body", "body", _body(length, f))]
+    outer_right = _outer(wrist, half_span, chord, figures)
+    result = [Part("body", "body", _body(length, figures))]
     for side, name in ((1, "right"), (-1, "left")):
         mirror = np.diag([float(side), 1.0, 1.0])
         root = (side * shoulder[0], shoulder[1], shoulder[2])
@@ -163,9 +163,11 @@ def parts(record: dict) -> tuple[list[Part], dict]:
         # tip.
         axis = (0.0, -float(side), 0.0)
         bend = (side * wrist[0], shoulder[1], shoulder[2])
-        result.append(Part(f"{name} inner wing", "wing", inner, root, axis, weight=f["wrist"]))
+        result.append(
+            Part(f"{name} inner wing", "wing", inner, root, axis, weight=figures["wrist"])
+        )
         parent = len(result) - 1
-        share = 1 - f["wrist"]
+        share = 1 - figures["wrist"]
         result.append(
             Part(f"{name} outer wing", "wing", outer, bend, axis, parent=parent, weight=share)
         )
