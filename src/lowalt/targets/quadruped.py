@@ -56,7 +56,7 @@ LEGS = (
     Leg("right hind", _HIND, 0.13, -0.5, 0.8, upper=0.42, lower=0.44, bend=1.0, start=0.5),
     Leg("left hind", _HIND, -0.13, -0.5, 0.8, upper=0.42, lower=0.44, bend=1.0, start=0.0),
 )
-"""The legs; in a trot the left fore leg steps with the right hind leg and the other two together."""
+"""In a trot the left fore leg steps with the right hind leg, and the other two step together."""
 
 
 def stride_hz(mass_kg: float, speed_mps: float) -> float:

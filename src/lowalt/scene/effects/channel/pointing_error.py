@@ -1,9 +1,10 @@
-"""Beams that miss the target: their direction has an error, and between updates the target flies on.
+"""Beams that miss the target: their direction has an error, and the target flies on.
 
-The error is drawn anew at every update. Both beams point where the tracker last saw the target, off by the error. Without updates they keep
-pointing at the target's place at the first symbol, as the paper's do. An update turns the beams
-about the arrays' middles, so a target in mid-beam keeps its phase. The land keeps the first beam.
-Every station has one error, in its own look and as either end of its links.
+The error is drawn anew at every update, and between updates the beams stand still. Both beams point
+where the tracker last saw the target, off by the error. Without updates they keep pointing at the
+target's position at the first symbol, as the paper's do. An update turns the beams about the
+arrays' middles, so a target in mid-beam keeps its phase. The land keeps the first beam. Every
+station has one error, in its own look and as either end of its links.
 """
 
 import numpy as np

@@ -1,4 +1,4 @@
-"""Comb pilots: only every K-th subcarrier carries known symbols, so ranges repeat after M / K cells.
+"""Comb pilots: only every K-th subcarrier carries known symbols; ranges repeat after M / K cells.
 
 The range cells of a comb are as long as those of the whole band; there are M / K of them, and
 farther echoes fold into them. A cell is the mean of M / K subcarriers, so its noise is 10 lg K
@@ -21,7 +21,7 @@ UNMODELLED = ("fmcw", "cw")
 
 
 def check(settings: dict, scene: CheckedScene) -> None:
-    """Raise InputError for a comb that does not divide the band, or an offset beyond its spacing."""
+    """Raise InputError for a comb that does not divide the band, or too large an offset."""
     count = scene.network.subcarriers
     spacing = settings["spacing"]
     offset = settings["offset"]
