@@ -4,7 +4,7 @@ import os
 from pathlib import Path
 
 _ENDED = ("Z", "X")
-"""States of a process that has ended: a zombie (its parent has not read its exit status) or dead."""
+"""States of a process that has ended: a zombie, of which only the exit status is left, or dead."""
 _STATE = 0
 _START_TIME = 19
 """Indices of the state and of the start time in the result of `_fields`. Source: proc(5), stat."""
