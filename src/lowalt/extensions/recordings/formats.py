@@ -24,7 +24,7 @@ from lowalt.extensions.recordings.mat_files import read_mat
 from lowalt.extensions.recordings.record import Record
 from lowalt.files.array_files import array_of
 from lowalt.files.atomic import bytes_of, text_file
-from lowalt.files.errors import InputError, lacking
+from lowalt.files.errors import InputError, missing_package
 from lowalt.files.inside import inside
 from lowalt.files.json_objects import read_object
 
@@ -327,7 +327,7 @@ def _sigmf(path: Path, record: Record) -> Table:
     try:
         import sigmf
     except ImportError as error:
-        raise lacking(error) from error
+        raise missing_package(error) from error
 
     metadata = read_object(path.with_suffix(".sigmf-meta"), "metadata of a SigMF recording")
     fields = metadata.get("global")
