@@ -25,7 +25,7 @@ from lowalt.recognition.distances import still_row
 from lowalt.report.figures.style import plt
 from lowalt.report.figures.target_picture import DIRECTIONS, draw_view
 from lowalt.report.figures.tile_axes import Axes, axes_of
-from lowalt.shards.kept_datasets import alone
+from lowalt.shards.kept_datasets import dataset_of_subtype
 from lowalt.targets.cloud import Cloud
 from lowalt.tiles.render import split
 
@@ -83,7 +83,7 @@ class Scene(NamedTuple):
 
 def scene(subject: Subject) -> Scene:
     """Return the panels' content of a sample without noise, as a shard of the default holds it."""
-    dataset = alone(overlaid([]), subject.subtype)
+    dataset = dataset_of_subtype(overlaid([]), subject.subtype)
     place = dataset.place_of(subject.subtype, subject.model, float("inf"))
     renderer = dataset.maker.renderer
     names = list(renderer.spectra)

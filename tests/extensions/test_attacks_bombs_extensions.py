@@ -1,5 +1,6 @@
-"""Recordings, towns, meshes and robots that would fill the memory, take minutes or never end: each is
-refused in one sentence before it does.
+"""Recordings, towns, meshes and robots that would fill the memory or never end.
+
+Those that would take minutes are among them. Each is refused in one sentence before it does.
 """
 
 import json

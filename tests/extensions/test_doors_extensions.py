@@ -1,5 +1,6 @@
-"""What strangers bring through the doors of the extensions: recordings with their records, data
-sets on web servers, and files whose numbers a library warns of.
+"""What strangers bring through the doors of the extensions.
+
+Recordings with their records, data sets on web servers, and files whose numbers a library warns of.
 """
 
 import json

@@ -307,7 +307,7 @@ def test_a_layer_that_is_changed_in_place_is_another_configuration():
 
 
 def test_no_layers_at_all_are_the_embedded_default():
-    network = kept_datasets.alone([], CAR).maker.network
+    network = kept_datasets.dataset_of_subtype([], CAR).maker.network
     assert network == Network.from_settings(overlaid([])["network"])
 
 

@@ -150,7 +150,7 @@ def test_an_archive_ends_with_two_empty_blocks_at_a_whole_record(samples):
     writer = Writer(file)
     for number in range(samples):
         writer.add(f"k{number}", b"{}", "png", bytes(1000 * number))
-    writer.close()
+    writer.close_with_checksum()
     with tarfile.open(fileobj=plain, mode="w") as archive:
         for number in range(2 * samples):
             info = tarfile.TarInfo(f"m{number}")

@@ -11,7 +11,7 @@ from lowalt.config.layers import overlaid
 from lowalt.files.atomic import replacing, write_file
 from lowalt.files.errors import InputError
 from lowalt.shards.dataset import Dataset
-from lowalt.shards.kept_datasets import alone
+from lowalt.shards.kept_datasets import dataset_of_subtype
 from lowalt.shards.receive import AT, receive, write
 from lowalt.shards.sample_list import sample_key
 from lowalt.tiles.png import encode
@@ -59,7 +59,7 @@ def run(options: argparse.Namespace) -> Answer:
             f"{options.subtype!r}, model {options.model}: expected a selected subtype and a number "
             "from 0"
         )
-    dataset = alone(config, options.subtype)
+    dataset = dataset_of_subtype(config, options.subtype)
     if options.raw:
         return _raw(options, dataset)
     from lowalt.report.figures.tile_axes import figure

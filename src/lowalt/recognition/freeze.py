@@ -17,15 +17,16 @@ def freeze(paths: list[str | Path], out: str | Path) -> None:
     Raises: InputError for a missing file, one given twice, or one outside that folder.
     """
     folder = Path(out).resolve().parent
-    lines = []
+    named: list[tuple[str, str]] = []
     for path in paths:
         full = existing(path, "file to freeze").resolve()
         if not full.is_relative_to(folder):
             raise InputError(f"{path}: not below {folder}, where {Path(out).name} is to stand")
-        lines.append(f"{sha256(full)}  {full.relative_to(folder).as_posix()}\n")
-    if len(set(lines)) < len(lines):
+        named.append((full.relative_to(folder).as_posix(), sha256(full)))
+    if len(set(named)) < len(named):
         raise InputError(f"{out}: a file was given twice")
-    write_file(out, "".join(sorted(lines, key=lambda line: line[66:])))
+    lines = [f"{digest}  {name}\n" for name, digest in sorted(named)]
+    write_file(out, "".join(lines))
 
 
 def verify(sums: str | Path) -> int:
@@ -43,7 +44,7 @@ def verify(sums: str | Path) -> int:
             raise InputError(
                 f"{sums} line {number}: {line!r}, expected a SHA-256, two spaces and a path"
             )
-        # No file has a null byte in its name, and `resolve` does not answer for one.
+        # For a name with a null byte, which no file has, `resolve` raises a ValueError.
         if "\0" in name or not (folder / name).resolve().is_relative_to(folder):
             raise InputError(f"{sums} line {number}: {name!r}, expected a file below {folder}")
         if sha256(existing(folder / name, "frozen file")) != digest:

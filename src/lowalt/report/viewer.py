@@ -1,7 +1,6 @@
-"""The samples in the viewer of a page: their choice, tiles with axes, echoes, probabilities, motion
-and truth.
+"""The samples in the viewer of a page.
 
-The viewer is one template with its script and its colours (`viewer.html`), which the report of a run
+They come with their tiles and axes, echoes, probabilities, motion and truth. The viewer is one template with its script and its colours (`viewer.html`), which the report of a run
 and the site of documents share; `shown` returns all that the template needs. All is small: motion
 is kept at FRAMES instants of one cycle.
 """
@@ -42,7 +41,10 @@ SNRS = 3
 BUDGET = 3_500_000
 """Limit for the bytes of all tiles as the page holds them; samples beyond it are left out."""
 FRAMES = 24
+"""Number of instants of one cycle of a target's motion."""
 POINTS = 160
+"""Largest number of points of a cloud that are drawn."""
+LARGEST_INT16 = 32767
 KEY = re.compile(r"(.+)-(\d{6,})-snr.+")
 TIME = "time (s)"
 WITHOUT = "none"
@@ -70,27 +72,29 @@ def chosen(shards: ShardSet, predicted: set[str], unseen: set[str]) -> list[int]
     a sample of every subtype in each, so that leaving out the last ones leaves out no subtype.
     """
     keys = [key.decode() for key in shards.keys.tolist()]
-    models: dict[tuple, dict[str, list[int]]] = {}
+    groups: dict[tuple, dict[str, list[int]]] = {}
     for number, (key, label) in enumerate(zip(keys, shards.labels.tolist(), strict=True)):
         name = KEY.fullmatch(key)[1]
-        group = models.setdefault((label, name in unseen), {})
-        group.setdefault(name, []).append(number)
+        subtypes = groups.setdefault((label, name in unseen), {})
+        subtypes.setdefault(name, []).append(number)
     picks: list[tuple[int, int]] = []
-    for _, subtypes in sorted(models.items()):
+    for _, subtypes in sorted(groups.items()):
         # The first subtype with predictions, or the first one where none has any.
-        shown = min(
-            subtypes, key=lambda name: (predicted.isdisjoint(keys[n] for n in subtypes[name]), name)
-        )
+        with_predictions = []
+        for name, numbers in subtypes.items():
+            if any(keys[number] in predicted for number in numbers):
+                with_predictions.append(name)
+        chosen_subtype = min(with_predictions or subtypes)
         of_model: dict[tuple, list[int]] = {}
-        for number in subtypes[shown]:
+        for number in subtypes[chosen_subtype]:
             model = int(KEY.fullmatch(keys[number])[2])
             of_model.setdefault((keys[number] not in predicted, model), []).append(number)
         for order, (_, numbers) in enumerate(sorted(of_model.items())[:MODELS]):
-            levels = sorted(numbers, key=lambda number: shards.snrs_db[number])
-            # The clearest, the noisiest, then the one between them.
-            steps_shown = dict.fromkeys([len(levels) - 1, 0, len(levels) // 2][:SNRS])
-            for step, level in enumerate(steps_shown):
-                picks.append((step * MODELS + order, levels[level]))
+            by_snr = sorted(numbers, key=lambda number: shards.snrs_db[number])
+            # The clearest, the noisiest, then the one between them; once each if they coincide.
+            levels = dict.fromkeys([len(by_snr) - 1, 0, len(by_snr) // 2][:SNRS])
+            for step, level in enumerate(levels):
+                picks.append((step * MODELS + order, by_snr[level]))
     return [number for _, number in sorted(picks, key=lambda pick: pick[0])]
 
 
@@ -133,13 +137,16 @@ def motion(cloud: Cloud, row: dict, network: Network) -> dict:
     picture per station (`lowalt.report.viewer_truth`).
     """
     moves = len(cloud.track) or row["rate_hz"] > 0
-    seconds = cycle_s(cloud, row) if moves else 1.0
+    seconds = 1.0  # any span will do for a target that does not move
+    if moves:
+        seconds = cycle_s(cloud, row)
     points = positions(cloud, still_row(row), np.arange(FRAMES) / FRAMES * seconds)
     some = np.unique(np.linspace(0, points.shape[1] - 1, POINTS).round().astype(int))
     points = points[:, some]
     points = points - (points.min(axis=(0, 1)) + points.max(axis=(0, 1))) / 2
     scale = max(float(abs(points).max()), 1e-9)
-    data = base64.b64encode((points / scale * 32767).round().astype("<i2").tobytes()).decode()
+    coordinates = (points / scale * LARGEST_INT16).round().astype("<i2")
+    data = base64.b64encode(coordinates.tobytes()).decode()
     of_parts = ["#{:02x}{:02x}{:02x}".format(*colour) for colour in colours(cloud)]
     return {
         "seconds": seconds,
@@ -205,11 +212,13 @@ def truth_panels(network: Network) -> list[dict]:
 
 
 def reduced(tile: np.ndarray, spectra: int, pixels: int, palette: np.ndarray) -> str:
-    """Return a tile (rows, columns) uint8 as an embedded PNG whose images have at most `pixels` a
-    side.
+    """Return a tile (rows, columns) uint8 as an embedded PNG.
+
+    Images of more than `pixels` a side are reduced to it.
     """
     images = split(tile, spectra)
-    images = resize(images, pixels) if images.shape[-1] > pixels else images
+    if images.shape[-1] > pixels:
+        images = resize(images, pixels)
     return embedded(encode(join(images, spectra), palette))
 
 
@@ -221,6 +230,9 @@ def _entry(
     heard = []
     if one.signal is not None:
         heard = echoes(one.signal, record["geometry"], network)
+    snr = "no noise"
+    if record["noise"]:
+        snr = f"{record['snr_db']:g} dB"
     tile, of_networks = tiles
     return {
         "subtype": record["subtype"],
@@ -228,7 +240,7 @@ def _entry(
         "model": record["model"],
         "group": group,
         "effect": one.effect,
-        "snr": f"{record['snr_db']:g} dB" if record["noise"] else "no noise",
+        "snr": snr,
         "tile": tile,
         "network": of_networks,
         "echoes": heard,

@@ -1,5 +1,4 @@
-"""The echoes of the viewer's samples: power and phase of each station over slow time, and the speed
-that is shown.
+"""The echoes of the viewer's samples: power and phase over slow time, and the speed that is shown.
 
 Both curves are kept as bytes, 0.8 kB per station: the eye sees no finer step in a panel 70 pixels
 high.
@@ -24,10 +23,10 @@ def _bytes(values: np.ndarray) -> str:
 
 
 def power(signal: np.ndarray) -> str:
-    """Return 255 (1 + dB / FLOOR_DB) of each symbol of one station's signal, (symbols,) complex, as
-    base64 of uint8.
+    """Return the power of each symbol of a station's signal, (symbols,) complex, in base64.
 
-    dB is the power over the station's largest one; a signal of zeros gives zeros.
+    The values are uint8, 255 (1 + dB / FLOOR_DB), where dB is the power over the station's largest
+    one; a signal of zeros gives zeros.
     """
     size = np.abs(signal).astype(float)
     most = size.max(initial=0.0)
@@ -38,8 +37,9 @@ def power(signal: np.ndarray) -> str:
 
 
 def phase(signal: np.ndarray) -> str:
-    """Return the phase of each symbol of a station's signal, (symbols,) complex, in 1/256 turns,
-    base64 of uint8.
+    """Return the phase of each symbol of a station's signal, (symbols,) complex, in base64.
+
+    The values are uint8, in 1/256 turns.
     """
     return _bytes(np.round(np.angle(signal) / (2 * math.pi) * 256).astype(int) % 256)
 
@@ -47,11 +47,10 @@ def phase(signal: np.ndarray) -> str:
 def echoes(
     signals: np.ndarray, geometry: dict[str, dict[str, float]], network: Network
 ) -> list[dict]:
-    """Return the page's entries of a sample's signals (stations, symbols) complex, station by
-    station.
+    """Return the page's entry for each station of a sample's signals (stations, symbols) complex.
 
     geometry: of the sample's record, with `range_m` and `radial_mps` of each station, receding
-    positive; None where it has no place.
+    positive; None where the target has no position.
     """
     entries = []
     for station, signal in zip(network.stations, signals, strict=True):

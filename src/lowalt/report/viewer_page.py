@@ -1,5 +1,6 @@
-"""The viewer of a small configuration, whose samples are made as the page is: with and without each
-effect that the configuration names.
+"""The viewer of a small configuration, whose samples are made together with the page.
+
+It shows them without effects and with each effect that the configuration names.
 """
 
 import warnings
@@ -15,13 +16,11 @@ MODEL = 0
 
 
 def variants(config: dict) -> dict[str, dict]:
-    """Return the configuration without effects, and with each of its effects alone, by the effect's
-    name.
-    """
-    without = {viewer.WITHOUT: {**config, "effects": {}}}
+    """Return the configuration without effects, and with each of its effects alone, by name."""
+    found = {viewer.WITHOUT: {**config, "effects": {}}}
     for name, settings in config["effects"].items():
-        without[name] = {**config, "effects": {name: settings}}
-    return without
+        found[name] = {**config, "effects": {name: settings}}
+    return found
 
 
 def dataset(config: dict) -> Dataset:
@@ -48,15 +47,19 @@ def viewer_of(config: dict) -> str:
     Raises: InputError naming the key or value that is wrong.
     """
     sets = {effect: dataset(variant) for effect, variant in variants(config).items()}
-    samples = [one for effect, found in sets.items() for one in viewed(effect, found)]
+    samples: list[viewer.ViewedSample] = []
+    for effect, of_effect in sets.items():
+        samples.extend(viewed(effect, of_effect))
     plain = sets[viewer.WITHOUT]
+    groups = {name: row["unseen_protocol"] for name, row in plain.published.items()}
+    sides = config["images"]["size"], config["recognition"]["size"]
     values = viewer.shown(
         samples,
         plain.maker.renderer,
         plain.clouds,
-        {name: row["unseen_protocol"] for name, row in plain.published.items()},
+        groups,
         plain.classes,
-        {},
-        (config["images"]["size"], config["recognition"]["size"]),
+        shares={},  # no network has classified these samples
+        sides=sides,
     )
     return templates().get_template("viewer.html").render(values)

@@ -1,5 +1,6 @@
-"""The truth of the viewer's samples: the folded radial speed of every point over time, as a picture
-with the axes of a spectrum.
+"""The truth of the viewer's samples: the folded radial speed of every point over time.
+
+It is a picture with the axes of a spectrum.
 """
 
 import colorsys
@@ -15,10 +16,14 @@ from lowalt.targets.cloud import Cloud
 
 COLUMNS = 200
 ROWS = 100
+"""Pixels of the picture."""
 BODY = (138, 143, 152)
 """Colour (RGB) of points of a target's body, which stands out on white and on black."""
 GOLDEN_DEG = 67
 """Angle between the hues of two parts that follow each other."""
+LIGHTNESS = 0.5
+SATURATION = 0.75
+"""Of the colours of all parts but the body (0 to 1): they stand out on white and on black."""
 STEP_S = 1e-6
 """Half the time over which speeds are taken: rotors turn far between two symbols."""
 
@@ -27,22 +32,28 @@ def colours(cloud: Cloud) -> list[tuple[int, int, int]]:
     """Return the colour (RGB, 0 to 255) of each part of a cloud."""
     found = []
     for number, kind in enumerate(cloud.kinds):
+        if kind == "body":
+            found.append(BODY)
+            continue
         hue = number * GOLDEN_DEG % 360 / 360
-        bright = colorsys.hls_to_rgb(hue, 0.5, 0.75)
-        found.append(BODY if kind == "body" else tuple(round(255 * share) for share in bright))
+        red, green, blue = colorsys.hls_to_rgb(hue, LIGHTNESS, SATURATION)
+        found.append((round(255 * red), round(255 * green), round(255 * blue)))
     return found
 
 
 def ranges_m(places: np.ndarray, station: Station) -> np.ndarray:
     """Return the range (...) m of places (..., 3) m, on a link half the way over its two ends."""
-    ends = [station] if station.transmitter is None else [station, station.transmitter]
+    ends: list = [station]
+    if station.transmitter is not None:
+        ends.append(station.transmitter)
     ways = [np.linalg.norm(places - np.asarray(end.position_m), axis=-1) for end in ends]
     return np.mean(ways, axis=0)
 
 
 def speeds_mps(cloud: Cloud, row: dict, station: Station, times_s: np.ndarray) -> np.ndarray:
-    """Return the radial speed (N, L) m/s of each point at times_s (N,), not folded, positive away
-    from the station.
+    """Return the radial speed (N, L) m/s of each point at times_s (N,), not folded.
+
+    It is positive away from the station.
     """
     before = ranges_m(positions(cloud, row, times_s - STEP_S), station)
     after = ranges_m(positions(cloud, row, times_s + STEP_S), station)
@@ -50,10 +61,9 @@ def speeds_mps(cloud: Cloud, row: dict, station: Station, times_s: np.ndarray) -
 
 
 def truth(cloud: Cloud, row: dict, network: Network, points: np.ndarray) -> list[str]:
-    """Return a picture per station of the folded radial speeds of `points` (numbers) of a cloud, as
-    an embedded PNG without a background.
+    """Return a picture per station of the folded radial speeds of `points` (numbers) of a cloud.
 
-    Columns: the look from left to right; rows: from the largest speed at the top down to its
+    Each is an embedded PNG without a background. Columns: the look from left to right; rows: from the largest speed at the top down to its
     negative; colours: of the points' parts, the body above the others.
     """
     look_s = network.symbols * network.symbol_interval_s
@@ -61,7 +71,10 @@ def truth(cloud: Cloud, row: dict, network: Network, points: np.ndarray) -> list
     part = cloud.part[points]
     # The last colour written stays.
     order = points[np.argsort(-part, kind="stable")]
-    palette = [channel for colour in [(0, 0, 0), *colours(cloud)] for channel in colour]
+    # Index 0 is the background, which is transparent; part n has the index n + 1.
+    palette = [0, 0, 0]
+    for colour in colours(cloud):
+        palette.extend(colour)
     pictures = []
     for station in network.stations:
         largest = network.largest_mps(station)

@@ -51,7 +51,7 @@ def refuse(effects: dict) -> None:
         )
 
 
-def packed(
+def recipe_record(
     record: bytes,
     key: str,
     snrs_db: Iterable[float],

@@ -1,8 +1,8 @@
 """Data sets of one subtype that stay in memory between calls, found again by their content.
 
 To check a configuration and the records of all targets takes a hundred times as long as one echo.
-Both are used again only where the layers of the configuration, the working directory, the folder of
-inputs and every file that any of them names have the content that they had.
+They are reused only while the layers of the configuration, the working directory, the folder of
+inputs and every file that any of them names are unchanged.
 """
 
 import copy
@@ -27,7 +27,7 @@ KEPT_CONFIGURATIONS = 4
 KEPT_SUBTYPES = 8
 """Largest numbers of configurations, and of subtypes of each, that stay in memory."""
 MOST_COMPARED_BYTES = 1_000_000
-"""Larger files count as unchanged while their size and their time of change are."""
+"""Files of more bytes are compared by size and modification time only."""
 
 Layer = str | Path | dict
 
@@ -35,8 +35,8 @@ Layer = str | Path | dict
 class Kept(NamedTuple):
     """A checked configuration and what was made of it.
 
-    records: of all its targets, merged; inputs: the folder of inputs; states: of every file that
-    it names; datasets: by subtype.
+    records: the merged records of all its targets; inputs: the folder of inputs; states: what
+    `_state` returned for each file that the configuration names; datasets: by subtype.
     """
 
     config: dict
@@ -49,8 +49,10 @@ class Kept(NamedTuple):
 _kept: dict[str, Kept] = {}
 
 
-def alone(configuration: Layer | Iterable[Layer], subtype: str) -> Dataset:
-    """Return the data set of one subtype and of those that the scene's effects need.
+def dataset_of_subtype(configuration: Layer | Iterable[Layer], subtype: str) -> Dataset:
+    """Return a data set of one subtype and of the subtypes that the scene's effects need.
+
+    The same data set is returned as long as nothing that it was made from has changed.
 
     Raises: InputError naming the key, value or file that is wrong.
     """
@@ -59,41 +61,55 @@ def alone(configuration: Layer | Iterable[Layer], subtype: str) -> Dataset:
     # The caller may change a layer after the call.
     layers = copy.deepcopy(list(configuration))
     key = _content(layers)
-    found = _kept.pop(key, None)
-    if found is None or any(_state(path) != state for path, state in found.states.items()):
-        found = _checked(layers)
-    _keep(_kept, key, found, KEPT_CONFIGURATIONS)
-    dataset = found.datasets.pop(subtype, None)
+    kept = _kept.get(key)
+    if kept is None or not _is_unchanged(kept):
+        kept = _checked(layers)
+    _keep_as_newest(_kept, key, kept, KEPT_CONFIGURATIONS)
+    dataset = kept.datasets.get(subtype)
     if dataset is None:
-        dataset = _made(found, subtype)
+        dataset = _made(kept, subtype)
     else:
+        # Each caller sees the warnings that making the data set gives, the first and all later.
         for text in dataset.folding:
             warn(text)
-    _keep(found.datasets, subtype, dataset, KEPT_SUBTYPES)
+    _keep_as_newest(kept.datasets, subtype, dataset, KEPT_SUBTYPES)
     return dataset
 
 
-def _keep(kept: dict, key: str, value: Any, most: int) -> None:
-    """Add a value as the latest of those kept, and drop the oldest beyond `most`."""
+def _is_unchanged(kept: Kept) -> bool:
+    """Whether every file that a configuration names is as it was when it was checked."""
+    return all(_state(path) == state for path, state in kept.states.items())
+
+
+def _keep_as_newest(kept: dict, key: str, value: Any, most: int) -> None:
+    """Put a value at the end of those kept, and drop from the front what exceeds `most`."""
+    # Assigning to a key that is there would leave it at its old position.
+    kept.pop(key, None)
     kept[key] = value
     while len(kept) > most:
         del kept[next(iter(kept))]
 
 
 def _content(layers: Sequence[Layer]) -> str:
-    """The layers as one text, with the content of files in place of them."""
-    held: list[object] = [str(Path.cwd()), os.environ.get("LOWALT_INPUTS")]
+    """Return a text that changes with the layers, their files and what else they depend on."""
+    content: list[object] = [str(Path.cwd()), os.environ.get("LOWALT_INPUTS")]
     for layer in layers:
         if isinstance(layer, dict):
-            held.append(layer)
+            content.append(layer)
         else:
-            held.append([str(layer), _state(shipped(layer))])
-    # The order of keys counts: it is that of the stations. `repr` stands for what JSON lacks.
-    return json.dumps(held, default=repr)
+            # A layer may be one of the package's configurations, named as in a checkout.
+            file = shipped(layer)
+            content.append([str(layer), _state(file)])
+    # The order of keys matters, since it numbers the stations: the keys are not sorted here.
+    # Values that JSON does not know, such as paths and dates, are written by `repr`.
+    return json.dumps(content, default=repr)
 
 
 def _state(path: Path) -> object:
-    """What tells a file's content from another: its SHA-256, or size and time; None without it."""
+    """Return a file's SHA-256, or its size and modification time if it is large.
+
+    Return None if the path is no regular file or cannot be read.
+    """
     try:
         about = path.stat()
         if not stat.S_ISREG(about.st_mode):
@@ -101,31 +117,36 @@ def _state(path: Path) -> object:
         if about.st_size > MOST_COMPARED_BYTES:
             return [about.st_size, about.st_mtime_ns]
         return hashlib.sha256(path.read_bytes()).hexdigest()
-    except (OSError, ValueError):
+    except OSError:
         return None
+    except ValueError:
+        return None  # a text of the configuration with a null byte, which no path can have
 
 
 def _checked(layers: Sequence[Layer]) -> Kept:
-    """A whole configuration checked, or layers on the embedded default, with what they name."""
+    """Return the checked configuration of the layers, its records and the states of its files."""
     config = _configuration(layers)
     inputs = config["inputs"] or os.environ.get("LOWALT_INPUTS")
-    targets = located(config)["targets"]
-    states = {path: _state(path) for path in _named_files(located(config), inputs)}
-    return Kept(config, records_of(targets, inputs), inputs, states, {})
+    with_paths = located(config)
+    # The states are taken first: a file that changes while its record is read counts as changed.
+    states = {path: _state(path) for path in _named_files(with_paths, inputs)}
+    records = records_of(with_paths["targets"], inputs)
+    return Kept(config, records, inputs, states, datasets={})
 
 
 def _configuration(layers: Sequence[Layer]) -> dict:
-    """The configuration of layers on the embedded default, or the whole one that they are."""
+    """Return the checked configuration: a single complete mapping, or layers over the default."""
     schema = shipped(SCHEMA)
     if len(layers) == 1 and isinstance(layers[0], dict):
-        is_whole = set(load_yaml(schema)["required"]) <= set(layers[0])
-        if is_whole:
+        required = set(load_yaml(schema)["required"])
+        is_complete = required <= set(layers[0])
+        if is_complete:
             return check(copy.deepcopy(layers[0]), schema)
     return overlaid(layers)
 
 
 def _made(kept: Kept, subtype: str) -> Dataset:
-    """The data set of one subtype and of those that the effects need."""
+    """Make the data set of one subtype and of the subtypes that the effects need."""
     select = list(dict.fromkeys([subtype, *needed_subtypes(kept.config["effects"])]))
     config = kept.config | {"targets": kept.config["targets"] | {"select": select}}
     return Dataset(config, inputs=kept.inputs, records=kept.records)
@@ -134,8 +155,8 @@ def _made(kept: Kept, subtype: str) -> Dataset:
 def _named_files(config: dict, inputs: str | None) -> Iterator[Path]:
     """Yield the files that a configuration or a record of its targets names.
 
-    A file of the folder of inputs counts also if it is not there, since a record may then be
-    replaced by an earlier one.
+    Files that are missing from the folder of inputs are among them: if one appears, another record
+    is chosen for its subtype.
     """
     for text in _texts(config):
         path = Path(text)

@@ -17,7 +17,7 @@ from lowalt.numerics.streams import stream
 from lowalt.scene.chain import SceneSample
 from lowalt.scene.truth import of_parts
 from lowalt.shards.dataset import Dataset
-from lowalt.shards.kept_datasets import alone
+from lowalt.shards.kept_datasets import dataset_of_subtype
 from lowalt.spectra.cube import TRUTH
 from lowalt.tiles.cubes import true_columns
 
@@ -123,7 +123,7 @@ def receive(
     if not isinstance(model, (int, np.integer)) or model < 0:
         raise InputError(f"model is {model!r}, expected a whole number from 0")
     if not isinstance(configuration, Dataset):
-        configuration = alone(configuration, subtype)
+        configuration = dataset_of_subtype(configuration, subtype)
     dataset: Dataset = configuration
     network = dataset.maker.network
     there = network.station(station or network.stations[0].name)

@@ -75,7 +75,7 @@ class Writer:
         digest = hashlib.sha256(written).digest()
         return Span(offset, len(written), positions["json"], positions[extension], digest)
 
-    def close(self) -> str:
+    def close_with_checksum(self) -> str:
         """Write the end of the archive; return the SHA-256 of the whole file in hexadecimal."""
         end = self.size + 2 * tarfile.BLOCKSIZE
         self._put(bytes(2 * tarfile.BLOCKSIZE + -end % RECORD))

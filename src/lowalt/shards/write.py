@@ -1,4 +1,4 @@
-"""One shard: the samples of a chunk in one fold, shuffled by their names, with their table."""
+"""One shard: samples of a chunk in one fold, in an order drawn from their names, with a table."""
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -11,7 +11,7 @@ from lowalt.config.network import Network
 from lowalt.config.splits import FOLDS, fold
 from lowalt.files.atomic import replacing
 from lowalt.files.errors import InputError
-from lowalt.shards.clean import packed
+from lowalt.shards.clean import recipe_record
 from lowalt.shards.sample_list import model_key, sample_key
 from lowalt.shards.sample_record import rank, record
 from lowalt.shards.sample_table import EXTENSIONS, KINDS, SAMPLE, table_path
@@ -19,15 +19,18 @@ from lowalt.shards.sample_table import write as write_table
 from lowalt.shards.tar import Span, Writer
 
 Content = Callable[[int, int], tuple[bytes, dict]]
+"""Given (row of the motion table, SNR index), returns the bytes of the member that stands next to
+the record, and what the record says of cubes ({} for other kinds).
+"""
 
 
 class ChunkSamples(NamedTuple):
     """The samples of a chunk: every motion model at every SNR.
 
     rows: the motion table; snrs: dB; split, seed: determine each sample's fold; classes: in the
-    order of their labels; powers: (stations, rows) W, reference powers of the SNRs, None for those
-    of the echoes;
-    filters: the effects that filter the noise, by name (both for kind "recipe").
+    order of their labels; powers: (stations, rows) W, reference powers of the SNRs, None: the
+    echoes' own powers; filters: the effects that filter the noise, by name. Only shards of kind
+    "recipe" store powers and filters.
     """
 
     rows: list[dict]
@@ -46,35 +49,38 @@ Chosen = list[tuple[int, int]]
 
 def select(rows: list[dict], snrs: list[float], split: dict, seed: int, wanted: str) -> Chosen:
     """Return (row, SNR index) of the samples of the fold `wanted`, in the shard's order."""
-    chosen = []
-    for number, row in enumerate(rows):
-        model = row.get("track", row["model"])
+    ranked = []
+    for index, row in enumerate(rows):
+        subtype = row["subtype"]
+        # All looks along one track share a fold, so that a test sees no track of the training.
+        model_or_track = row.get("track", row["model"])
         for level, snr_db in enumerate(snrs):
             # The row of a measured sample names its fold; that of a simulated sample is drawn.
-            of_sample = row.get("fold") or fold(split, seed, row["subtype"], model, snr_db)
-            if of_sample == wanted:
-                chosen.append((rank(seed, row["subtype"], row["model"], snr_db), number, level))
-    return [(number, level) for _, number, level in sorted(chosen)]
+            fold_name = row.get("fold") or fold(split, seed, subtype, model_or_track, snr_db)
+            if fold_name == wanted:
+                ranked.append((rank(seed, subtype, row["model"], snr_db), index, level))
+    return [(index, level) for _, index, level in sorted(ranked)]
 
 
 def _of_piece(chosen: Chosen, piece: int, pieces: int) -> Chosen:
     """The samples of one of the pieces of a fold: its motion models are dealt out in turn."""
-    piece_of: dict[int, int] = {}
-    for number, _ in chosen:
-        piece_of.setdefault(number, len(piece_of) % pieces)
-    return [(number, level) for number, level in chosen if piece_of[number] == piece]
+    piece_of_row: dict[int, int] = {}
+    for index, _ in chosen:
+        if index not in piece_of_row:
+            piece_of_row[index] = len(piece_of_row) % pieces
+    return [(index, level) for index, level in chosen if piece_of_row[index] == piece]
 
 
-def _record(chunk: ChunkSamples, number: int, level: int, fold_name: str, cubes: dict) -> bytes:
+def _record(chunk: ChunkSamples, index: int, level: int, fold_name: str, cubes: dict) -> bytes:
     """The record of one sample of a chunk."""
-    row = chunk.rows[number]
+    row = chunk.rows[index]
     snr_db = chunk.snrs[level]
     return record(row, snr_db, fold_name, chunk.seed, chunk.network, chunk.classes, cubes)
 
 
-def _entry(chunk: ChunkSamples, number: int, level: int, span: Span) -> tuple:
+def _entry(chunk: ChunkSamples, index: int, level: int, span: Span) -> tuple:
     """A sample's row of the shard's table (`sample_table.SAMPLE`)."""
-    row = chunk.rows[number]
+    row = chunk.rows[index]
     snr_db = chunk.snrs[level]
     key = sample_key(row["subtype"], row["model"], snr_db)
     digest = np.frombuffer(span.sha256, np.uint8)
@@ -87,13 +93,13 @@ def _add_samples(
 ) -> list[tuple]:
     """Add the samples of a chunk to a shard; return the rows of its table."""
     entries = []
-    for number, level in chosen:
-        row = chunk.rows[number]
+    for index, level in chosen:
+        row = chunk.rows[index]
         key = sample_key(row["subtype"], row["model"], chunk.snrs[level])
-        data, cubes = content(number, level)
-        text = _record(chunk, number, level, wanted, cubes)
+        data, cubes = content(index, level)
+        text = _record(chunk, index, level, wanted, cubes)
         span = tar.add(key, text, EXTENSIONS[kind], data)
-        entries.append(_entry(chunk, number, level, span))
+        entries.append(_entry(chunk, index, level, span))
     return entries
 
 
@@ -105,21 +111,21 @@ def _add_models(
     Return the rows of its table; those of all samples of a motion model refer to the model.
     """
     levels: dict[int, list[int]] = {}
-    for number, level in chosen:
-        levels.setdefault(number, []).append(level)
+    for index, level in chosen:
+        levels.setdefault(index, []).append(level)
     spans: dict[int, Span] = {}
     entries = []
-    for number, level in chosen:
-        if number not in spans:
-            row = chunk.rows[number]
-            data, cubes = content(number, level)
+    for index, level in chosen:
+        if index not in spans:
+            row = chunk.rows[index]
+            data, cubes = content(index, level)
             name = model_key(row["subtype"], row["model"])
-            snrs_db = sorted(chunk.snrs[each] for each in levels[number])
-            power_w = None if chunk.powers is None else chunk.powers[:, number]
-            text = _record(chunk, number, level, wanted, cubes)
-            text = packed(text, name, snrs_db, power_w, chunk.filters)
-            spans[number] = tar.add(name, text, EXTENSIONS["recipe"], data)
-        entries.append(_entry(chunk, number, level, spans[number]))
+            snrs_db = sorted(chunk.snrs[each] for each in levels[index])
+            power_w = None if chunk.powers is None else chunk.powers[:, index]
+            text = _record(chunk, index, level, wanted, cubes)
+            of_model = recipe_record(text, name, snrs_db, power_w, chunk.filters)
+            spans[index] = tar.add(name, of_model, EXTENSIONS["recipe"], data)
+        entries.append(_entry(chunk, index, level, spans[index]))
     return entries
 
 
@@ -134,10 +140,9 @@ def write_shard(
     """Write the samples of the fold `wanted` to `path` (.tar) and their table next to it.
 
     Return the table's header.
-    content: a function of (row, SNR index) that returns the bytes of the sample's .png (kind
-    "image") or .npy, or of the row's clean echoes (kind "recipe"), and what the record says of
-    cubes ({} for other kinds). A recipe shard stores each motion model once, at the position of its
-    first sample, to which all its samples refer.
+    content: see `Content`; its bytes are those of the sample's .png (kind "image") or .npy, or of
+    the row's clean echoes (kind "recipe"). A recipe shard stores each motion model once, at the
+    position of its first sample, to which all its samples refer.
     piece: index and number of the pieces into which the fold is split; samples of a motion model
     stay together.
     Raises: InputError where the chunk mixes groups, has a sample twice, or fold or kind is unknown.
@@ -149,7 +154,8 @@ def write_shard(
     groups = sorted({row["group"] for row in chunk.rows})
     if len(groups) != 1:
         raise InputError(f"{path}: its motion table has the groups {groups}, expected exactly one")
-    chosen = _of_piece(select(chunk.rows, chunk.snrs, chunk.split, chunk.seed, wanted), *piece)
+    of_fold = select(chunk.rows, chunk.snrs, chunk.split, chunk.seed, wanted)
+    chosen = _of_piece(of_fold, *piece)
     with replacing(path) as temporary:
         with temporary.open("wb") as file:
             tar = Writer(file)
@@ -157,8 +163,10 @@ def write_shard(
                 entries = _add_models(tar, chunk, chosen, wanted, content)
             else:
                 entries = _add_samples(tar, chunk, chosen, wanted, kind, content)
-            checksum = tar.close()
+            checksum = tar.close_with_checksum()
         table = np.array(entries, SAMPLE)
+        # Looked for among the keys as the table stores them, and before the block ends, so that a
+        # shard with a sample twice never replaces the file at `path`.
         keys, counts = np.unique(table["key"], return_counts=True)
         if (counts > 1).any():
             twice = keys[counts > 1][0].decode()

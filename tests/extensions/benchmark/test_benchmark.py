@@ -1,5 +1,6 @@
-"""The benchmark's definition and tracks: frozen, disjoint, and from the data that the checksums
-describe.
+"""The benchmark's definition and tracks.
+
+They are frozen, disjoint, and from the data that the checksums describe.
 """
 
 import hashlib
@@ -55,8 +56,9 @@ def test_the_definition_takes_nothing_that_decides_bytes_from_the_default():
 
 @pytest.mark.parametrize("part", PARTS)
 def test_samples_made_again_are_those_that_are_kept(part):
-    """Every subtype, of smaller parts a few: a change of targets, motion, echo, noise or effects is
-    seen here.
+    """Every subtype, and a few samples of the smaller parts.
+
+    A change of targets, motion, echo, noise or effects is seen here.
     """
     kept = [
         (name, digest)
@@ -188,8 +190,10 @@ def test_the_inner_splits_hold_out_each_subtype_that_trains_once():
 @pytest.mark.parametrize("use", ["validation", "test"])
 @pytest.mark.parametrize("track", TRACKS.values(), ids=list(TRACKS))
 def test_neighbours_that_validate_or_test_have_no_class_in_common(track, use):
-    """Even whoever is told the most frequent class of each twentieth of the rows answers little
-    better than chance.
+    """The order of the rows tells no classes.
+
+    Whoever is told the most frequent class of each twentieth of the rows answers little better than
+    chance.
     """
     labels = track.samples(use).facts.label
     right = [np.bincount(rows).max() for rows in np.array_split(labels, 20)]

@@ -19,8 +19,9 @@ NAMES = [
 @pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_samples_of_the_benchmark_have_their_kept_checksums_on_another_processor(name, tmp_path):
-    """One sample of each subtype and some of every other part; natively `tests/benchmark` makes
-    them again.
+    """One sample of each subtype, and some of every other part.
+
+    `tests/benchmark` makes them again natively.
     """
     run(name, "-m", "lowalt.extensions.benchmark", "results", "--samples", "--out", str(tmp_path))
     made, kept = (

@@ -1,5 +1,6 @@
-"""The benchmark as a stranger uses it, on a small copy of its definition: data, examples, scores,
-confirmation.
+"""The benchmark as a stranger uses it, on a small copy of its definition.
+
+Data, examples, scores and confirmation.
 """
 
 import hashlib
@@ -94,8 +95,9 @@ def test_an_example_writes_a_submission_that_is_scored(small, name, track, monke
 
 
 def test_the_example_of_a_choice_holds_out_subtypes_of_every_split(small, monkeypatch, capsys):
-    """The small benchmark has one subtype of each class that trains, so its splits are replaced by
-    parts.
+    """The splits of the small benchmark are replaced by parts.
+
+    It has only one subtype of each class that trains.
     """
     asked = []
     load = benchmark.load
@@ -220,8 +222,9 @@ def test_make_reports_a_signal_that_differs_in_one_last_bit(small, monkeypatch, 
 
 
 def stating(path, track, **changed):
-    """A model of the zoo in a file that states the training of a track; changed: other entries of
-    its identity.
+    """A model of the zoo in a file that states the training of a track.
+
+    changed: other entries of its identity.
     """
     content = model_file.read(ZOO)
     stated = {

@@ -1,5 +1,6 @@
-"""Rows of others: a folder of submissions is scored anew, and the page on it leads to a confirmed
-row.
+"""Rows of others: a folder of submissions is scored anew.
+
+The page on it leads to a confirmed row.
 """
 
 import csv

@@ -20,8 +20,9 @@ def checkout(tmp_path, monkeypatch):
 
 
 def test_a_submission_to_the_benchmark(checkout, monkeypatch):
-    """On a small copy of the benchmark; its data come from the test, so that no workflow starts and
-    no byte is kept.
+    """The tutorial runs on a small copy of the benchmark.
+
+    Its data come from the test, so that no workflow starts and no byte is kept.
     """
     small_benchmark.shrink(monkeypatch)
     monkeypatch.setattr(

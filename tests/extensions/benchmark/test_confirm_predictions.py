@@ -1,5 +1,6 @@
-"""A user's own file that answers is confirmed: it is frozen with all that it reads, before its code
-runs.
+"""A user's own file that answers is confirmed.
+
+It is frozen with all that it reads, before its code runs.
 """
 
 import json

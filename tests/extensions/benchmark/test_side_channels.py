@@ -1,5 +1,6 @@
-"""Side channels of a data set: those said to be closed give chance, those that are forbidden give
-the class.
+"""Side channels of a data set.
+
+Those said to be closed give chance, those that are forbidden give the class.
 """
 
 import csv
@@ -84,8 +85,9 @@ def test_the_size_of_an_image_s_file_follows_from_its_pixels(tmp_path):
 
 
 def test_a_channel_that_leaks_is_seen_and_one_that_does_not_is_not():
-    """Forty motion models of each class with two samples each: in the order of the classes, and
-    shuffled.
+    """Forty motion models of each class with two samples each.
+
+    They are returned in the order of the classes, and shuffled.
     """
     labels = np.repeat(np.arange(4), 80)
     groups = np.repeat(np.arange(160), 2)

@@ -1,5 +1,6 @@
-"""Targets drafted from a data sheet: what it states stands in the record, the rest grows with the
-size.
+"""Targets drafted from a data sheet.
+
+What it states stands in the record, the rest grows with the size.
 """
 
 import warnings

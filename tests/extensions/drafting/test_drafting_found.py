@@ -1,5 +1,6 @@
-"""What moves on a mesh without joints: rotors by name, hub and number, wings from the body; sizes
-that do not fit.
+"""What moves on a mesh without joints.
+
+Rotors are found by name, hub and number, wings from the body; sizes that do not fit are refused.
 """
 
 import re
@@ -44,8 +45,9 @@ def draft(path: Path, *words: str) -> tuple[int, Path]:
 
 @pytest.fixture
 def refused(tmp_path, capsys, monkeypatch):
-    """A function of a file and words that returns why `target new` refuses it; pictures go to the
-    test's folder.
+    """A function of a file and words that returns why `target new` refuses it.
+
+    Pictures go to the test's folder.
     """
     monkeypatch.chdir(tmp_path)
 
@@ -380,8 +382,9 @@ def test_blades_by_name_of_which_some_stand_alone_are_asked_for_by_number(tmp_pa
 
 
 def bird(tmp_path: Path, long: float, lean: float = 0.0) -> Path:
-    """A bird longer or shorter than its span, its wings bent down from 4 cm out; `lean` moves them
-    apart.
+    """A bird longer or shorter than its span, its wings bent down from 4 cm out.
+
+    `lean` moves them apart.
     """
     shapes = {"trunk": trimesh.creation.icosphere(3)}
     shapes["trunk"].apply_scale([0.045, long / 2, 0.04])

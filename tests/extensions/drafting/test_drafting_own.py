@@ -1,5 +1,6 @@
-"""Own targets: a mesh is inspected, a record is drafted from it, and the draft becomes the right
-cloud at once.
+"""Own targets: from a mesh to the right cloud.
+
+A mesh is inspected, a record is drafted from it, and the draft becomes the right cloud at once.
 """
 
 from pathlib import Path
@@ -90,8 +91,9 @@ def test_units_are_guessed_from_the_usual_proportions(sizes, category, unit):
 
 
 def bird(scale: float = 1.0) -> trimesh.Trimesh:
-    """A body, two thin wings from 4 cm out and a tail that spreads wider than that, front along y,
-    widest along x.
+    """A body, two thin wings from 4 cm out and a tail that spreads wider than that.
+
+    Its front is along y, and it is widest along x.
     """
     shapes = [box((0.08, 0.25, 0.08)), box((0.12, 0.08, 0.01), (0, -0.16, 0.03))]
     shapes += [box((0.3, 0.1, 0.01), (side * 0.18, 0.02, 0.03)) for side in (-1, 1)]

@@ -1,5 +1,6 @@
-"""Where the front of a target is: each kind of evidence, evidence that contradicts itself or the
-user, and its law.
+"""Where the front of a target is.
+
+Each kind of evidence, evidence that contradicts itself or the user, and its law.
 """
 
 import numpy as np

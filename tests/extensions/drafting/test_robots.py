@@ -1,5 +1,6 @@
-"""Robots' own descriptions: each joint of a rotor or wheel becomes a part that turns about the
-right line.
+"""Robots' own descriptions.
+
+Each joint of a rotor or wheel becomes a part that turns about the right line.
 """
 
 from pathlib import Path

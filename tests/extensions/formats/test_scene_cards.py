@@ -1,5 +1,6 @@
-"""Data sets of scenes and of a drafted town: each has a card, by which other people's tools read
-it.
+"""Data sets of scenes and of a drafted town have cards.
+
+Other people's tools read the data sets by them.
 """
 
 import json
@@ -51,8 +52,9 @@ def drafted_town(folder):
 
 
 def check_tools(scene, tmp_path, monkeypatch, mlcroissant):
-    """Make a few samples of a scene and their card; the hub's library, Croissant's and WebDataset
-    read all samples.
+    """Make a few samples of a scene and their card, and read them by it.
+
+    The hub's library, Croissant's and WebDataset read all samples.
     """
     config = overlaid([scene, FEW])
     config["noise"]["snr_db"] = config["noise"]["snr_db"][:2]
@@ -76,8 +78,9 @@ def check_tools(scene, tmp_path, monkeypatch, mlcroissant):
 
 
 def read_by_hub(shards, numbers, tmp_path, monkeypatch):
-    """Keys of the samples that the hub's library reads by the card, each with its record and
-    array.
+    """Keys of the samples that the hub's library reads by the card.
+
+    Each comes with its record and array.
     """
     keys = set()
     folder = shards.index_path.parent

@@ -1,5 +1,6 @@
-"""SigMF recordings: what the metadata say of a station and of a sample is that station's and that
-sample's own.
+"""SigMF recordings of the samples of shards.
+
+What the metadata say of a station and of a sample is that station's and that sample's own.
 """
 
 import hashlib

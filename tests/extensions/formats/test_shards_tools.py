@@ -73,8 +73,9 @@ def text(value):
 
 
 def test_croissant_is_valid_and_its_first_record_unpacks_no_shard(published, mlcroissant):
-    """Every cell of its records is that of the table of samples; all required and recommended
-    properties are there.
+    """Every cell of the card's records is that of the table of samples.
+
+    All required and recommended properties are there.
     """
     data = mlcroissant.Dataset(str(published / "croissant.json"))
     assert not data.metadata.issues.errors

@@ -1,5 +1,6 @@
-"""A data set on a web server: the same samples by byte ranges alone, the same checks, and refusals
-in one sentence.
+"""A data set on a web server.
+
+The same samples by byte ranges alone, the same checks, and refusals in one sentence.
 """
 
 import contextlib

@@ -264,8 +264,9 @@ def test_names_of_columns_outrank_guesses_and_contradictions_are_refused(tmp_pat
 
 
 def first_of(path, carrier):
-    """The first reading of a file of captures that do not belong together, which an inspection
-    points out.
+    """The first reading of a file of captures that do not belong together.
+
+    An inspection points this out.
     """
     seen = inspect_recording(path, carrier, RATE)
     assert "the record takes the first" in " ".join(seen.notes)

@@ -1,5 +1,6 @@
-"""A recogniser for one's own radar: its twin out of a record, a network that predicts, and what is
-asked for.
+"""A recogniser for one's own radar.
+
+Its twin out of a record, a network that predicts, and what is asked for.
 """
 
 import re

@@ -1,5 +1,6 @@
-"""Which windows hold a target: the floor is that of the recording's own noise, and a line must
-stand above it.
+"""Which windows hold a target.
+
+The floor is that of the recording's own noise, and a line must stand above it.
 """
 
 from dataclasses import replace

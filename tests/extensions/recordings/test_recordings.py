@@ -1,5 +1,6 @@
-"""Recordings in: every format gives the same samples, bad files are refused by name, rates and
-tones come out right.
+"""Recordings in: every format gives the same samples.
+
+Bad files are refused by name, and rates and tones come out right.
 """
 
 import struct
@@ -24,8 +25,9 @@ BASE = {"carrier_hz": 24.0e9, "source": "made here", "licence": "MIT"}
 
 
 def tone(hertz: float, seconds: float = 0.5, rate: float = RATE) -> np.ndarray:
-    """A complex tone (samples,) of unit amplitude, with a little of another one so that nothing is
-    constant.
+    """A complex tone (samples,) of unit amplitude.
+
+    A little of another tone is added, so that nothing is constant.
     """
     time = np.arange(round(seconds * rate)) / rate
     return np.exp(2j * np.pi * hertz * time) + 0.1 * np.exp(2j * np.pi * 3.7 * hertz * time)
@@ -232,8 +234,9 @@ STOPPED = {"anti_aliased": 0.5, "one_sided": 1.0, "bare": np.inf}
 @pytest.mark.parametrize("sampling", ["anti_aliased", "one_sided", "bare"])
 @pytest.mark.parametrize("rate", [2000.0, 2205.0, 8000.0])
 def test_tones_across_the_band_keep_their_amplitude_or_vanish(sampling, channel, rate):
-    """A symbol rate of 1000: the gain of tones from 2 Hz on, at least 99.9 % where kept, at most
-    0.1 % where not.
+    """The gain of tones from 2 Hz on, at a symbol rate of 1000.
+
+    It is at least 99.9 % where tones are kept, and at most 0.1 % where they are not.
     """
     if sampling == "one_sided" and channel == "complex":
         with pytest.raises(InputError, match="one_sided' for a complex channel"):

@@ -1,5 +1,6 @@
-"""What receivers write: raw numbers, structs, MAT 7.3, semicolons, complex cells, channels and
-captures of SigMF.
+"""The formats that receivers write.
+
+Raw numbers, structs, MAT 7.3, semicolons, complex cells, channels and captures of SigMF.
 """
 
 import json
@@ -213,8 +214,9 @@ def test_sigmf_opens_no_file_elsewhere(tmp_path):
 def test_bytes_that_sigmf_declares_to_be_no_samples_are_not_read(
     tmp_path, headers, trailing, dataset
 ):
-    """Each capture begins behind its header, and the last sample stands before the trailing
-    bytes.
+    """Each capture begins behind its header.
+
+    The last sample stands before the trailing bytes.
     """
     pytest.importorskip("sigmf")
     values = wave().astype(np.complex64)
@@ -312,8 +314,9 @@ def test_an_array_of_hdf5_is_named_by_its_path(tmp_path):
 
 
 def chirps_of(count: int = 200, samples: int = 32) -> np.ndarray:
-    """Chirps (count, samples) complex of a target that moves by 0.1 cycles from chirp to chirp, and
-    of a wall.
+    """Chirps (count, samples) complex of a moving target and of a wall.
+
+    The target moves by 0.1 cycles from chirp to chirp.
     """
     fast = np.arange(samples) / samples
     slow = np.arange(count)[:, None]

@@ -1,5 +1,6 @@
-"""A recording nobody has seen: a WAV and five lines become spectra, tiles, a shard and a
-prediction.
+"""A recording nobody has seen.
+
+A WAV and five lines become spectra, tiles, a shard and a prediction.
 """
 
 import json
@@ -27,8 +28,9 @@ SPEED = 6.0
 
 
 def drive(folder, rate, stereo, swapped=False, **more):
-    """Write a WAV of a target that leaves at SPEED from a fifth of a second on, and its record of
-    five lines.
+    """Write a WAV of a target, and its record of five lines.
+
+    The target leaves at SPEED from a fifth of a second on.
     """
     time = np.arange(round(SECONDS * rate)) / rate
     tone = np.exp(-2j * np.pi * 2 * SPEED * CARRIER / 299792458.0 * time) * (time > 0.2)
