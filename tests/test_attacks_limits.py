@@ -92,8 +92,9 @@ def test_the_least_limit_of_the_control_groups_counts(name, tmp_path):
 
 def test_lack_of_memory_is_one_sentence():
     said = error_sentence(MemoryError("Unable to allocate 9 GiB"))
-    assert said == (
-        "memory: not enough (Unable to allocate 9 GiB), expected more of it, or a smaller input"
+    assert (
+        said
+        == "memory: not enough (Unable to allocate 9 GiB), expected more of it, or a smaller input"
     )
 
 

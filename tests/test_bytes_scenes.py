@@ -42,7 +42,10 @@ def test_signals_of_every_shipped_scene_do_not_follow_the_processor(tmp_path):
 
 def test_a_blas_is_told_which_kernels_to_choose():
     """Without this the tests above would compare one kernel with itself."""
-    program = "import numpy as np; r = np.random.default_rng(1).standard_normal((300, 300)); print(hash((r @ r).tobytes()))"
+    program = (
+        "import numpy as np; r = np.random.default_rng(1).standard_normal((300, 300));"
+        " print(hash((r @ r).tobytes()))"
+    )
     found = set()
     for core in ("Haswell", "Nehalem"):
         line = [sys.executable, "-c", program]

@@ -40,7 +40,10 @@ PROGRAMS = {
         stage: f"import sys, lowalt.{stage}.__main__; print('torch' in sys.modules)"
         for stage in LIGHT
     },
-    "plain": "import sys, lowalt.echo.__main__, lowalt.noise.__main__; print('lowalt.scene' in sys.modules)",
+    "plain": (
+        "import sys, lowalt.echo.__main__, lowalt.noise.__main__; print('lowalt.scene' in"
+        " sys.modules)"
+    ),
     "scenes": (
         "import os, sys, lowalt.echo.__main__, lowalt.scene.__main__, lowalt.noise.__main__\n"
         "from lowalt.scene.effects import called\n"

@@ -221,7 +221,10 @@ def test_a_folder_that_is_no_set_becomes_one_by_a_file(tmp_path, capsys, library
         f"buses: left out, no set of that name and no {recorded_sets.SET_FILE} in it"
         in capsys.readouterr().err
     )
-    line = '{file: "*.wav", carrier_hz: 24.0e+9, channel: complex, label: Vehicle, source: made here, licence: MIT}'
+    line = (
+        '{file: "*.wav", carrier_hz: 24.0e+9, channel: complex, label: Vehicle, source: made here,'
+        " licence: MIT}"
+    )
     (tmp_path / "buses/set.yaml").write_text(f"like: vehicle_24ghz\nfiles:\n  - {line}\n")
     (bus,) = recordings(tmp_path)
     assert (bus.set, bus.like, bus.half, bus.name) == (

@@ -105,7 +105,10 @@ def test_jobs_that_outlived_their_run_are_ended_by_force_where_they_do_not_heed_
     tmp_path, monkeypatch
 ):
     monkeypatch.setattr(locks, "GRACE_S", 0.5)
-    program = "import signal, time; signal.signal(signal.SIGTERM, signal.{}); print(1, flush=True); time.sleep(60)"
+    program = (
+        "import signal, time; signal.signal(signal.SIGTERM, signal.{}); print(1, flush=True);"
+        " time.sleep(60)"
+    )
     heeding, stubborn, another = jobs = [
         subprocess.Popen(
             [sys.executable, "-c", program.format(answer)],

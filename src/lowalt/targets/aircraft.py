@@ -52,16 +52,19 @@ def fault(record: dict) -> str | None:
         and not figures["tip_chord"] <= figures["root_chord"] < figures["body_length"]
     ):
         return (
-            f"figures.root_chord is {figures['root_chord']:.4g} m, expected from the tip's chord to the "
-            "body's length"
+            f"figures.root_chord is {figures['root_chord']:.4g} m, expected from the tip's chord to"
+            " the body's length"
         )
     if "wing_station" in figures and not 0 < figures["wing_station"] < 1:
-        return f"figures.wing_station is {figures['wing_station']}, expected between 0 (nose) and 1 (tail)"
+        return (
+            f"figures.wing_station is {figures['wing_station']}, expected between 0 (nose) and 1"
+            " (tail)"
+        )
     if figures.get("boom_spacing", 0) >= record["published"]["size_m"]:
         span = record["published"]["size_m"]
         return (
-            f"figures.boom_spacing is {figures['boom_spacing']:.4g} m, expected less than the span of "
-            f"{span} m"
+            f"figures.boom_spacing is {figures['boom_spacing']:.4g} m, expected less than the span"
+            f" of {span} m"
         )
     return None
 

@@ -54,8 +54,8 @@ def fault(record: dict) -> str | None:
     without_trunk = figures["bill"] + figures["head"] + figures["neck"] + figures["tail"]
     if without_trunk > 0.9:
         return (
-            f"figures bill, head, neck and tail add up to {without_trunk:.3g} of the length, expected at "
-            "most 0.9"
+            f"figures bill, head, neck and tail add up to {without_trunk:.3g} of the length,"
+            " expected at most 0.9"
         )
     if figures["span"] / figures["length"] <= 2 * figures["body_width"]:
         return f"figures.span is {figures['span']:.3g} m, expected more than twice the body's width"

@@ -41,7 +41,10 @@ def fault(record: dict) -> str | None:
             f"{table['len_m']} m length"
         )
     if figures["track"] >= table["wid_m"]:
-        return f"figures.track is {figures['track']:.4g} m, expected less than the {table['wid_m']} m width"
+        return (
+            f"figures.track is {figures['track']:.4g} m, expected less than the {table['wid_m']} m"
+            " width"
+        )
     if record["model"] == "bus":
         return None
     return _profile_fault(figures, table)

@@ -64,8 +64,10 @@ class Answers(NamedTuple):
             "nothing": "nothing there",
             "clipped": "clipped by the receiver",
             "lost": "samples are lost: exact zeros",
-            "beyond": f"a line at {self.beyond_mps[number]:.3g} m/s, beyond the {self.fastest_mps:.3g} m/s of this "
-            "network",
+            "beyond": (
+                f"a line at {self.beyond_mps[number]:.3g} m/s, beyond the {self.fastest_mps:.3g}"
+                " m/s of this network"
+            ),
         }
         return said.get(outcome) or f"{100 * self.probabilities[number].max():6.2f} %  {outcome}"
 
@@ -80,18 +82,22 @@ def answers(trained: Trained, settings: dict, record: Record, where: str) -> Ans
     known = radars()
     if "radar" not in settings:
         raise InputError(
-            f"{trained.path}: knows no recordings, expected a network of a radar such as {sorted(known)}"
+            f"{trained.path}: knows no recordings, expected a network of a radar such as"
+            f" {sorted(known)}"
         )
     radar = Twin.from_settings(settings["radar"])
     if not radar.near(record.carrier_hz):
         near = [name for name, other in known.items() if other.near(record.carrier_hz)]
         raise InputError(
-            f"{where}: carrier_hz is {record.carrier_hz:.3g}, and {trained.path.stem} knows {radar.carrier_hz:.3g}, "
+            f"{where}: carrier_hz is {record.carrier_hz:.3g}, and {trained.path.stem} knows"
+            f" {radar.carrier_hz:.3g}, "
             + (
                 f"expected a network of {near}"
                 if near
-                else "expected a network of your own radar, which "
-                "`lowalt recording train` makes; the zoo has none"
+                else (
+                    "expected a network of your own radar, which "
+                    "`lowalt recording train` makes; the zoo has none"
+                )
             )
         )
     twin = radar.at_carrier(record.carrier_hz)
@@ -166,8 +172,8 @@ def _notes(record: Record, radar: Twin, caution: str, found: bool) -> list[str]:
         at = radar.carrier_hz / 1e9
         here = record.carrier_hz / 1e9
         notes.append(
-            f"this network learned a radar at {at:.4g} GHz, and the recording is at {here:.4g} GHz: expect "
-            "wrong classes; `lowalt recording train` makes a network for its radar"
+            f"this network learned a radar at {at:.4g} GHz, and the recording is at {here:.4g} GHz:"
+            " expect wrong classes; `lowalt recording train` makes a network for its radar"
         )
     if found and not radar.slowest_mps and record.empty_s is None:
         notes.append(
