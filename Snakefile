@@ -26,7 +26,7 @@ include: "workflow/rules/report.smk"
 
 onstart:
     print(*filter(None, (RUN.sources, RUN.folding)), sep="\n", file=sys.stderr)
-    with refusing():
+    with user_errors_in_one_line():
         space.before(workflow, RUN.plan, config)
 
 

@@ -195,7 +195,10 @@ def scaling(config: dict, cloud: Cloud) -> list[dict]:
     named = ["exact" if tolerance is None else f"{tolerance:g}" for _, _, tolerance in sizes]
     return [
         {
-            "what": f"one signal of {cloud.category} {cloud.subtype}, {symbols} symbols x {points} points, {name}",
+            "what": (
+                f"one signal of {cloud.category} {cloud.subtype}, {symbols} symbols x {points}"
+                f" points, {name}"
+            ),
             "seconds": seconds,
         }
         for (symbols, points, _), name, (seconds, _) in zip(
@@ -233,8 +236,10 @@ def main() -> None:
             seconds = stage(config, paths, rows, jobs_of, processes, Path(folder))
             result.append(
                 {
-                    "what": f"echo stage, {len(rows)} models x {len(everyone)} stations, {how}, "
-                    f"{processes} process(es)",
+                    "what": (
+                        f"echo stage, {len(rows)} models x {len(everyone)} stations, {how}, "
+                        f"{processes} process(es)"
+                    ),
                     "seconds": seconds,
                     "models_per_s": len(rows) / seconds,
                     "paper_minutes": PAPER / (len(rows) / seconds) / 60,

@@ -214,7 +214,8 @@ def main() -> None:
     os.chdir(ROOT)
     start_s, start_calls, job_calls = started()
     print(
-        f"a start of Snakemake: {start_s:.1f} core-seconds, {start_calls:.0f} calls; a job: {job_calls:.0f} calls"
+        f"a start of Snakemake: {start_s:.1f} core-seconds, {start_calls:.0f} calls; a job:"
+        f" {job_calls:.0f} calls"
     )
     with (ROOT / "results/benchmarks/stages.csv").open(newline="") as file:
         measured = {row["stage"]: row for row in csv.DictReader(file) if row["jobs"]}

@@ -65,7 +65,8 @@ def planted(tree: Path, fault: dict[str, str]) -> str:
     good = path.read_text()
     if good.count(fault["old"]) != 1:
         raise ValueError(
-            f"{fault['file']}: {fault['old']!r} stands there {good.count(fault['old'])} times, expected 1"
+            f"{fault['file']}: {fault['old']!r} stands there {good.count(fault['old'])} times,"
+            " expected 1"
         )
     with tempfile.TemporaryDirectory() as compiled:
         # Numba's kept machine code does not notice a change of a function that was compiled into

@@ -164,7 +164,7 @@ def from_known_seed(found: Evidence, chosen: np.ndarray) -> np.ndarray:
     best with the signal of the first station.
     """
     label_of = {record["subtype"]: record["label"] for record in found.records}
-    (station, *_) = found.shards.index["render"]["network"]["stations"]
+    station, *_ = found.shards.index["render"]["network"]["stations"]
     answers = []
     for number in chosen.tolist():
         signal = found.shards.signal(number)[0]

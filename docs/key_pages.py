@@ -149,7 +149,8 @@ def records_page(schema: dict) -> str:
                     f"schema of records: {name} has no description, expected one line of meaning"
                 )
             lines.append(
-                f"| `{name}`{' (needed)' * (name in section.get('required', []))} | {key['description']} |"
+                f"| `{name}`{' (needed)' * (name in section.get('required', []))} |"
+                f" {key['description']} |"
             )
         lines.append("")
     lines += [

@@ -4,7 +4,10 @@ import numpy as np
 
 from lowalt.scene.view import View
 
-SOURCE = "ITU-R P.838-3, 2005, Eqs. 1 to 3, Tables 2 and 4 (vertical polarisation); the whole way lies in the rain"
+SOURCE = (
+    "ITU-R P.838-3, 2005, Eqs. 1 to 3, Tables 2 and 4 (vertical polarisation); the whole way lies"
+    " in the rain"
+)
 DEFAULTS = {"mm_per_h": 20.0}
 IDLE = [{"mm_per_h": 0}]
 

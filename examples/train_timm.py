@@ -63,5 +63,6 @@ with torch.no_grad():
         for images, labels in DataLoader(test, given.batch)
     )
 print(
-    f"loss {loss.item():.3f} after {step} steps, {100 * right / len(test):.1f} % of {len(test)} validation samples"
+    f"loss {loss.item():.3f} after {step} steps, {100 * right / len(test):.1f} % of {len(test)}"
+    " validation samples"
 )

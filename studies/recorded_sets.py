@@ -75,7 +75,8 @@ class Measured(NamedTuple):
         """
         if self.radar not in library.twins:
             raise InputError(
-                f"set {self.set!r}: no radar {self.radar!r}, expected one of {sorted(library.twins)}"
+                f"set {self.set!r}: no radar {self.radar!r}, expected one of"
+                f" {sorted(library.twins)}"
             )
         return library.twins[self.radar].at_carrier(self.record.carrier_hz)
 
@@ -91,7 +92,8 @@ class Measured(NamedTuple):
         nearest = min(self.rates_hz, key=lambda rate_hz: abs(rate_hz - baseband.rate_hz))
         if abs(nearest - baseband.rate_hz) > RATE_SHARE * nearest:
             raise InputError(
-                f"{self.record.file}: wrong rate, {baseband.rate_hz:.6g} Hz, expected one of {self.rates_hz}"
+                f"{self.record.file}: wrong rate, {baseband.rate_hz:.6g} Hz, expected one of"
+                f" {self.rates_hz}"
             )
         return baseband._replace(rate_hz=nearest)
 
@@ -185,7 +187,8 @@ def _blocks(inputs: Path, sets: str | Path) -> dict[str, tuple[str, list[dict]]]
             or not isinstance(block["files"], list)
         ):
             raise InputError(
-                f"{folder / SET_FILE}: expected files, a list of records, and like, one of {sorted(known)}"
+                f"{folder / SET_FILE}: expected files, a list of records, and like, one of"
+                f" {sorted(known)}"
             )
         blocks[folder.name] = block["like"], block["files"]
     return blocks

@@ -5,6 +5,8 @@ import math
 
 import pytest
 
+import kept_records
+from lowalt.targets import records
 from meshes import write_bird, write_quad
 from skips import Skips
 
@@ -34,6 +36,8 @@ LONG = (
     "test_targets_more",
 )
 
+
+records.merge = kept_records.once(records.merge)
 
 # Imports make millions of objects that stay: looking through them for garbage took a tenth of the
 # tests' time.
@@ -65,6 +69,19 @@ def pytest_collection_finish():
     """From here on look for garbage among what tests make alone."""
     gc.freeze()
     gc.enable()
+
+
+@pytest.fixture(scope="session", autouse=True)
+def kept_clouds():
+    """Data sets and explanations of equal records share their clouds; tests of clouds do not."""
+    from lowalt.scene import explanation
+    from lowalt.shards import dataset
+
+    places = ((dataset, "made_cloud"), (dataset, "made_surfaces"), (explanation, "make"))
+    with pytest.MonkeyPatch.context() as patch:
+        for module, name in places:
+            patch.setattr(module, name, kept_records.once_without_files(getattr(module, name)))
+        yield
 
 
 @pytest.fixture

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from lowalt.config.command import refusal
+from lowalt.config.command import error_sentence
 from lowalt.files.errors import SpaceError
 from lowalt.files.processes import lives
 from lowalt.machine import memory
@@ -91,9 +91,10 @@ def test_the_least_limit_of_the_control_groups_counts(name, tmp_path):
 
 
 def test_lack_of_memory_is_one_sentence():
-    said = refusal(MemoryError("Unable to allocate 9 GiB"))
-    assert said == (
-        "memory: not enough (Unable to allocate 9 GiB), expected more of it, or a smaller input"
+    said = error_sentence(MemoryError("Unable to allocate 9 GiB"))
+    assert (
+        said
+        == "memory: not enough (Unable to allocate 9 GiB), expected more of it, or a smaller input"
     )
 
 

@@ -79,7 +79,10 @@ def test_emulation_leaves_instructions_out():
     """Without this the tests above would compare a processor with itself."""
     program = "import numpy as np, json; from numba.core.registry import cpu_target as t;"
     program += "from numpy._core._multiarray_umath import __cpu_features__ as f;"
-    program += "print(json.dumps([bool(f.get('X86_V3', f['FMA3'])), t.target_context.codegen().magic_tuple()[1]]))"
+    program += (
+        "print(json.dumps([bool(f.get('X86_V3', f['FMA3'])),"
+        " t.target_context.codegen().magic_tuple()[1]]))"
+    )
     fused, name = json.loads(run("x86-64-v2", "-c", program))
     assert not fused and name == "nehalem"
 

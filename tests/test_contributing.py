@@ -176,7 +176,10 @@ def test_one_new_file_and_its_schema_entry_add_an_effect_that_is_run_documented_
 
 
 def test_one_new_file_and_its_schema_entry_add_a_spectrum_that_is_run_documented_and_priced(lines):
-    pattern = r"power \(mean power\): 16 rows, 192 windows, zero at index 128, \d+\.\d\d ms per image \| window 16"
+    pattern = (
+        r"power \(mean power\): 16 rows, 192 windows, zero at index 128, \d+\.\d\d ms per image \|"
+        r" window 16"
+    )
     (line,) = [number for number, line in enumerate(lines) if re.match(pattern, line)]
     assert lines[line + 1] == "  any textbook, ch. 3"
     before, found = map(json.loads, lines[1:3])

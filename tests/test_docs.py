@@ -3,6 +3,7 @@ site links them.
 """
 
 import argparse
+import functools
 import html
 import importlib
 import json
@@ -12,17 +13,15 @@ import shlex
 import subprocess
 import sys
 import tomllib
-from importlib.metadata import packages_distributions
+from importlib import metadata
 from pathlib import Path
 
-import benchmark_picture
 import pytest
 import yaml
 from key_pages import configuration_page, effects_page
 
 from lowalt.__main__ import main
 from lowalt.config.layers import load, overlaid
-from lowalt.extensions.benchmark import baseline_table
 from lowalt.files.errors import InputError, install_command
 from lowalt.scene.effects import PLACES
 from pages import browsed
@@ -201,6 +200,12 @@ def test_a_missing_package_is_asked_for_by_its_own_name():
     assert not from_index
 
 
+@functools.cache
+def packages_of_modules():
+    """The packages that offer each module, read from every installed package's files."""
+    return metadata.packages_distributions()
+
+
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_a_page_that_imports_a_package_beyond_the_set_up_says_how_to_install_it(page):
     """Also where only the program in `examples/` imports it that a command of the page runs."""
@@ -223,7 +228,7 @@ def test_a_page_that_imports_a_package_beyond_the_set_up_says_how_to_install_it(
     known += [need for name in filter(None, named.split(",")) for need in extras[name]]
     known += re.findall(r"pip install[^`\n]* (\w+)`", text)
     have = {re.match(r"[\w-]+", need)[0].lower() for need in known} | {"lowalt"}
-    offers = packages_distributions()
+    offers = packages_of_modules()
     # A package that the page itself makes.
     have |= set(re.findall(r'title="[^"]*?(\w+)/__init__\.py"', text))
     sources = {
@@ -435,14 +440,6 @@ def test_a_window_of_1280_pixels_shows_every_tab_and_the_benchmark_s_tables_sort
     assert len(numbers) > 9 and numbers == sorted(numbers)
     # A cell is one line.
     assert height < 50
-
-
-def test_the_picture_of_the_benchmark_is_that_of_the_kept_table():
-    rows = baseline_table.read()
-    for name, narrow in (("benchmark.svg", False), ("benchmark-narrow.svg", True)):
-        assert (ROOT / "docs/pictures" / name).read_text() == benchmark_picture.picture(
-            rows, narrow
-        )
 
 
 def test_every_page_of_the_site_exists_and_every_page_is_in_the_site():

@@ -40,7 +40,10 @@ PROGRAMS = {
         stage: f"import sys, lowalt.{stage}.__main__; print('torch' in sys.modules)"
         for stage in LIGHT
     },
-    "plain": "import sys, lowalt.echo.__main__, lowalt.noise.__main__; print('lowalt.scene' in sys.modules)",
+    "plain": (
+        "import sys, lowalt.echo.__main__, lowalt.noise.__main__; print('lowalt.scene' in"
+        " sys.modules)"
+    ),
     "scenes": (
         "import os, sys, lowalt.echo.__main__, lowalt.scene.__main__, lowalt.noise.__main__\n"
         "from lowalt.scene.effects import called\n"
@@ -213,8 +216,8 @@ def tokens(text: str) -> int:
 
 
 TOKENS = {
-    "files": 4466,
-    "machine": 2994,
+    "files": 5_342,
+    "machine": 3_401,
     "numerics": 9630,
     "config": 7_902,
     "targets": 45724,
@@ -233,7 +236,7 @@ TOKENS = {
     "extensions/benchmark": 12325,
     "extensions/drafting": 27658,
     "extensions/formats": 2_307,
-    "extensions/recordings": 31329,
+    "extensions/recordings": 33_201,
     "extensions/town": 22928,
 }
 """Tokens of each room and extension. A commit that needs more than SLACK above it raises its figure

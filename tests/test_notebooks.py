@@ -97,7 +97,10 @@ def test_links_of_a_notebook_lead_to_files_of_the_repository(made, page):
 def test_cells_run_in_order_in_the_checkout_and_a_failing_line_is_not_passed_over(made, checkout):
     """`test_tutorials` runs the blocks of all pages in the quick suite."""
     errors = pytest.importorskip("nbclient").exceptions
-    text = "```python\nprint(open('Snakefile').read(8), end='')\n```\n```sh\nfalse\ntrue\n```\n```python\nprint(1)\n```\n"
+    text = (
+        "```python\nprint(open('Snakefile').read(8),"
+        " end='')\n```\n```sh\nfalse\ntrue\n```\n```python\nprint(1)\n```\n"
+    )
     short = made.notebook(text)
     with pytest.raises(errors.CellExecutionError):
         run(short, checkout)

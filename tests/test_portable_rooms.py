@@ -115,5 +115,8 @@ def test_a_room_whose_bytes_are_promised_uses_portable_functions(path):
 
 
 def test_each_way_to_a_loose_last_bit_is_found():
-    text = "a = x**3 + x**0.5 + 2**n + x**2\nb = np.sin(x) @ y\nc = math.exp(1) + math.sqrt(2) + np.linalg.norm(x)"
+    text = (
+        "a = x**3 + x**0.5 + 2**n + x**2\nb = np.sin(x) @ y\nc = math.exp(1) + math.sqrt(2) +"
+        " np.linalg.norm(x)"
+    )
     assert sorted(loose(text)) == ["**", "**", "@", "exp", "norm", "sin"]

@@ -120,8 +120,8 @@ def test_a_workflow_deployed_from_the_catalogue_can_be_planned(tmp_path):
         shutil.copytree(ROOT / name, tmp_path / name)
     (tmp_path / "workflow").mkdir()
     (tmp_path / "workflow/Snakefile").write_text(
-        f'configfile: "config/config.yaml"\n\nmodule lowalt:\n    snakefile: "{ROOT}/workflow/Snakefile"\n'
-        "    config: config\n\nuse rule * from lowalt\n"
+        'configfile: "config/config.yaml"\n\nmodule lowalt:\n    snakefile:'
+        f' "{ROOT}/workflow/Snakefile"\n    config: config\n\nuse rule * from lowalt\n'
     )
     status, said = run(tmp_path, ["-n", "--cores", "1"], os.environ)
     assert status == 0, said[-3000:]

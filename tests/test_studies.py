@@ -57,7 +57,10 @@ def test_a_study_says_what_it_is_and_its_configurations_fit_the_schema(study):
 def test_the_command_of_each_study_starts():
     paths = [str(study / "study.py") for study in STUDIES if (study / "study.py").is_file()]
     # The folders that Python and `studies/study.mk` put first.
-    start = "import runpy, sys; sys.path[:0] = {!r}; sys.argv = {!r}; runpy.run_path(sys.argv[0], run_name='__main__')"
+    start = (
+        "import runpy, sys; sys.path[:0] = {!r}; sys.argv = {!r}; runpy.run_path(sys.argv[0],"
+        " run_name='__main__')"
+    )
     folders = [str(ROOT / "src"), str(ROOT / "studies")]
     programs = [
         start.format([str(Path(path).parent), *folders], [path, "--help"]) for path in paths

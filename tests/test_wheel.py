@@ -157,7 +157,10 @@ def test_the_installed_command_makes_the_reference_s_bytes_in_an_empty_folder(in
 
 
 def test_configurations_of_the_package_are_found_from_any_folder(installed, tmp_path):
-    program = "from lowalt.config.layers import overlaid; print(*overlaid(['config/scenes/urban.yaml'])['effects'])"
+    program = (
+        "from lowalt.config.layers import overlaid;"
+        " print(*overlaid(['config/scenes/urban.yaml'])['effects'])"
+    )
     run = subprocess.run(
         [sys.executable, "-c", program],
         cwd=tmp_path,

@@ -11,7 +11,7 @@ import sys
 from importlib import import_module
 
 from lowalt.commands.command_table import COMMANDS
-from lowalt.config.command import REFUSALS, drop_output, refusal, warn_in_one_line
+from lowalt.config.command import USER_ERRORS, drop_output, error_sentence, warn_in_one_line
 from lowalt.config.core_commands import CORE_COMMANDS, Command
 from lowalt.config.extensions import extensions_in_words, function_offered
 from lowalt.files.atomic import FULL
@@ -47,7 +47,7 @@ def _add(commands: argparse._SubParsersAction, name: str, entry: Command) -> Non
     try:
         add_to = function_offered("commands", name, entry.module, "add_to")
     except (InputError, ImportError) as error:
-        print(f"error: {refusal(error)}", file=sys.stderr)
+        print(f"error: {error_sentence(error)}", file=sys.stderr)
         commands.add_parser(name, help=entry.meaning).set_defaults(act=None)
     else:
         add_to(commands, name)
@@ -62,10 +62,10 @@ def main(arguments: list[str] | None = None) -> int:
         # The reader, such as `head`, has closed its end.
         drop_output()
         return 128 + signal.SIGPIPE
-    except REFUSALS as error:
+    except USER_ERRORS as error:
         if isinstance(error, OSError) and error.errno in FULL:
             drop_output()
-        print(f"error: {refusal(error)}", file=sys.stderr)
+        print(f"error: {error_sentence(error)}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         print(

@@ -236,8 +236,8 @@ class LogHandler(LogHandlerBase):
         if not self._full and (free < NEARLY_FULL_BYTES or os.strerror(FULL[0]) in text):
             self._full = True
             self._say(
-                f"the disk is full: {free / 1e6:.1f} MB are free in {Path.cwd()}; whole files are kept, "
-                "so make room and start the run again"
+                f"the disk is full: {free / 1e6:.1f} MB are free in {Path.cwd()}; whole files are"
+                " kept, so make room and start the run again"
             )
 
     @staticmethod

@@ -86,7 +86,8 @@ def write_table(rows: list[dict], folder: str | Path) -> None:
     there = {(row["track"], row["method"]) for row in read(folder)} if path.is_file() else set()
     if lost := sorted(there - {(row["track"], row["method"]) for row in rows}):
         raise InputError(
-            f"{path}: would lose the rows of {lost[:3]}, {len(lost)} in all; expected a table with them"
+            f"{path}: would lose the rows of {lost[:3]}, {len(lost)} in all; expected a table with"
+            " them"
         )
     rows = sorted(rows, key=lambda row: (order.index(row["track"]), -row["percent"], row["method"]))
     plain = [

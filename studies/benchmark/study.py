@@ -310,7 +310,8 @@ def write_confirmed(jobs: list[tuple[str, str]], data: str, out: Path) -> None:
     for method, name in jobs:
         found = confirmed((method, name), data, ZOO)
         print(
-            f"{name}, {method}: confirmed at {baseline_table.words(found.percent)} %, {found.sha256}",
+            f"{name}, {method}: confirmed at {baseline_table.words(found.percent)} %,"
+            f" {found.sha256}",
             flush=True,
         )
         rows = kept_rows(out)

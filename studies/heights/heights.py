@@ -59,7 +59,8 @@ def elevation_error(network: Network, station: Station, snr_db: float) -> float:
     rows = network.receive[1]
     if rows < 2:
         raise InputError(
-            f"heights: receive_array {network.receive} has {rows} row, expected two or more for a height"
+            f"heights: receive_array {network.receive} has {rows} row, expected two or more for a"
+            " height"
         )
     if snr_db == math.inf:
         return 0.0

@@ -95,7 +95,8 @@ def main(arguments: list[str]) -> None:
     write_csv(options.out / "measured-fourth.csv", COLUMNS, found)
     for row in found:
         print(
-            f"{row[0]}, {row[1]}, {row[3]}: {row[-2]:.1f} % of {row[4]} windows of {row[2]} are right"
+            f"{row[0]}, {row[1]}, {row[3]}: {row[-2]:.1f} % of {row[4]} windows of {row[2]} are"
+            " right"
         )
 
 

@@ -55,8 +55,8 @@ def read_labels(path: Path = LABELS) -> dict[str, dict[str, list[Interval]]]:
                 words = what if isinstance(what, list) else [what]
                 if not last <= first < end or not set(words) <= {*CATEGORIES, EMPTY}:
                     raise InputError(
-                        f"{where}: interval {[first, end, what]}, expected seconds that rise, and classes "
-                        f"of {CATEGORIES} or {EMPTY!r}"
+                        f"{where}: interval {[first, end, what]}, expected seconds that rise, and"
+                        f" classes of {CATEGORIES} or {EMPTY!r}"
                     )
                 last = end
                 intervals.append((float(first), float(end), TOGETHER.join(words)))

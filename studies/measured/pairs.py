@@ -57,7 +57,8 @@ def measured_stretch(recording: Measured, twin: Twin, start_s: float, seconds: f
     length_s = len(baseband.values) / baseband.rate_hz
     if round(start_s * baseband.rate_hz) + round(seconds * baseband.rate_hz) > len(baseband.values):
         raise InputError(
-            f"{recording.record.file}: {length_s:.3g} s, expected at least {start_s + seconds:.3g} s"
+            f"{recording.record.file}: {length_s:.3g} s, expected at least"
+            f" {start_s + seconds:.3g} s"
         )
     signal = at_symbol_rate(recording.record, twin, baseband)
     first = round(start_s / twin.symbol_interval_s)

@@ -221,7 +221,10 @@ def test_a_folder_that_is_no_set_becomes_one_by_a_file(tmp_path, capsys, library
         f"buses: left out, no set of that name and no {recorded_sets.SET_FILE} in it"
         in capsys.readouterr().err
     )
-    line = '{file: "*.wav", carrier_hz: 24.0e+9, channel: complex, label: Vehicle, source: made here, licence: MIT}'
+    line = (
+        '{file: "*.wav", carrier_hz: 24.0e+9, channel: complex, label: Vehicle, source: made here,'
+        " licence: MIT}"
+    )
     (tmp_path / "buses/set.yaml").write_text(f"like: vehicle_24ghz\nfiles:\n  - {line}\n")
     (bus,) = recordings(tmp_path)
     assert (bus.set, bus.like, bus.half, bus.name) == (
@@ -238,6 +241,7 @@ def test_a_folder_that_is_no_set_becomes_one_by_a_file(tmp_path, capsys, library
         recordings(tmp_path)
 
 
+@pytest.mark.slow
 def test_each_network_says_something_of_every_labelled_window(tmp_path):
     """Two networks of two steps each: what they say is of no use, where it stands is."""
     (tmp_path / "inputs/vehicle_24ghz").mkdir(parents=True)

@@ -262,7 +262,7 @@ def test_wander_has_its_rms_in_decibels_and_flicker_its_corner():
 
 def test_the_craft_at_3_ghz_has_propellers_of_its_maker_s_length():
     library = Library.read()
-    (scene, *_) = library.scenes["uav_3ghz"]["UAV"]
+    scene, *_ = library.scenes["uav_3ghz"]["UAV"]
     cloud = clouds_of(library.records, scene["subtypes"], 1)[scene["subtypes"][0]]
     for blades in range(1, 5):
         tips = cloud.points[cloud.part == blades]

@@ -10,7 +10,7 @@ import sys
 import pytest
 
 from lowalt.__main__ import main
-from lowalt.config.command import pick, refusal, run, settings
+from lowalt.config.command import error_sentence, pick, run, settings
 from lowalt.files.atomic import replacing
 from lowalt.files.errors import InputError
 
@@ -66,9 +66,12 @@ def test_a_path_that_the_system_refuses_is_named_in_one_line(tmp_path, monkeypat
         and said.startswith(f"error: {file}/below: Not a directory")
         and said.count("\n") == 1
     )
-    assert refusal(OSError(errno.ENOSPC, "no space", "a")) == "a: no space, expected room to write"
+    assert (
+        error_sentence(OSError(errno.ENOSPC, "no space", "a"))
+        == "a: no space, expected room to write"
+    )
     with pytest.raises(OSError, match="broken"):
-        refusal(OSError(errno.EIO, "broken", "file"))
+        error_sentence(OSError(errno.EIO, "broken", "file"))
 
 
 def test_a_package_that_is_not_installed_is_named_with_the_command_that_installs_it(
@@ -84,7 +87,7 @@ def test_a_package_that_is_not_installed_is_named_with_the_command_that_installs
         "error: the package torch is not installed, expected `pip install torch torchvision timm`\n"
     )
     with pytest.raises(ModuleNotFoundError, match="nowhere"):
-        refusal(ModuleNotFoundError("nowhere", name="nowhere"))
+        error_sentence(ModuleNotFoundError("nowhere", name="nowhere"))
 
 
 def test_a_reader_that_has_enough_ends_a_command_without_a_traceback():

@@ -200,7 +200,10 @@ def test_odd_inputs_end_with_2_and_one_clear_sentence(line, capsys, monkeypatch,
 def test_a_shell_completes_commands_options_and_files(words, current, wanted, capsys, monkeypatch):
     assert main(["completion"]) == 0
     words = " ".join(map(shlex.quote, [*words, current]))
-    text = f"{capsys.readouterr().out}\nCOMP_WORDS=({words}); COMP_CWORD=$((${{#COMP_WORDS[@]}} - 1)); _lowalt"
+    text = (
+        f"{capsys.readouterr().out}\nCOMP_WORDS=({words}); COMP_CWORD=$((${{#COMP_WORDS[@]}} - 1));"
+        " _lowalt"
+    )
     # Zsh lists files only while a person types.
     names = ("bash",) if "/" in current else ("bash", "zsh")
     shells = [shell for shell in map(shutil.which, names) if shell] or pytest.skip("no bash")
@@ -229,7 +232,7 @@ def test_verify_and_remake_end_with_1_where_a_byte_differs(tmp_path, capsys):
     assert json.loads(capsys.readouterr().out) == {"good": True, "faults": []}
     assert main(["verify", str(index)]) == 0
     assert "every byte is as it was written" in capsys.readouterr().out
-    (shard, *_) = sorted((tmp_path / "set").glob("*.tar"))
+    shard, *_ = sorted((tmp_path / "set").glob("*.tar"))
     raw = bytearray(shard.read_bytes())
     raw[700] ^= 1
     shard.write_bytes(raw)
@@ -259,7 +262,7 @@ def test_predict_names_the_classes_by_their_probability(tmp_path, capsys):
 def test_report_asks_the_workflow_for_the_page_of_the_same_run(tmp_path, monkeypatch, capsys):
     asked = []
 
-    def snakemake(line):
+    def snakemake(line, **_):
         overlay = line[line.index("--configfile") + 1 :]
         asked.append(
             (load([*overlay[: overlay.index("--")]], SCHEMA), overlay[overlay.index("--") + 1 :])

@@ -43,7 +43,10 @@ def test_explain_takes_out_together_what_needs_each_other_and_a_target_without_s
     steps = []
     monkeypatch.setattr(Reporter, "__call__", lambda self, done: steps.append((done, self._unit)))
     overlay = tmp_path / "scene.yaml"
-    effects = "effects: {clutter: {}, canceller: {kind: pulse}}, targets: {own: {more: config/targets/more.yaml}}"
+    effects = (
+        "effects: {clutter: {}, canceller: {kind: pulse}}, targets: {own: {more:"
+        " config/targets/more.yaml}}"
+    )
     overlay.write_text(
         f"{{run: a, network: {{symbols: 32}}, spectra: {{vrp: {{window: 16}}}}, {effects}}}"
     )
@@ -130,7 +133,10 @@ def test_spectra_answers_with_the_size_of_each(answer, capsys):
         and text[-1] == f"medians of 5; {found['hardware']}"
     )
     for one, first, second in zip(found["spectra"], text[::2], text[1::2], strict=False):
-        said = f"{one['name']} ({one['title']}): {one['rows']} rows, {one['windows']} windows, zero at index "
+        said = (
+            f"{one['name']} ({one['title']}): {one['rows']} rows, {one['windows']} windows, zero at"
+            " index "
+        )
         assert first.startswith(f"{said}{one['zero_index']}, ") and second == f"  {one['source']}"
         assert first.endswith(", ".join(f"{key} {value}" for key, value in one["settings"].items()))
     assert status == 0
@@ -145,7 +151,7 @@ def test_spectra_answers_with_the_size_of_each(answer, capsys):
 def snakemake(code, jobs=()):
     """In the place of Snakemake: note planned jobs, leave a run's state behind, end with a status."""
 
-    def run(line, stdout=None, env=None):
+    def run(line, stdout=None, env=None, **_):
         assert stdout == 2
         Path(env[PLANNED_JOBS]).write_text("".join(json.dumps(job) + "\n" for job in jobs))
         board = Board({"clouds": 2}, 1.0)

@@ -112,7 +112,7 @@ def test_run_passes_overlays_targets_and_the_exit_status_on(tmp_path, monkeypatc
     # 137 is how shells name the end by SIGKILL.
     for code, seen in ((7, 7), (-9, 137)):
         monkeypatch.setattr(
-            workflow.subprocess, "run", lambda line, code=code: given(returncode=code)
+            workflow.subprocess, "run", lambda line, code=code, **_: given(returncode=code)
         )
         assert lowalt_command(["run"]) == seen
     monkeypatch.setattr(workflow, "SNAKEFILE", tmp_path / "Snakefile")

@@ -100,6 +100,10 @@ def test_the_command_line_lists_the_commands_of_the_core(core):
     assert "extensions:" not in shown and "left out" not in shown
 
 
+def test_the_jobs_of_the_default_are_planned(core):
+    core("-m", "lowalt", "run", "-n", "--target", "data")
+
+
 # All tests of the core in one process: some twenty minutes.
 @pytest.mark.slow
 def test_all_tests_of_the_core_pass(core):

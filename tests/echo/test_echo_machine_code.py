@@ -303,7 +303,8 @@ def test_a_kept_kernel_calls_the_function_that_it_was_compiled_with(tmp_path):
         module.parent.mkdir()
         module.write_text(LINKED.format(60 * f"x = x * 0.5 + {offset}; "))
         uses.append(
-            f"sys.path.insert(0, {str(module.parent)!r}); sys.modules.pop('linked', None); import linked"
+            f"sys.path.insert(0, {str(module.parent)!r}); sys.modules.pop('linked', None); import"
+            " linked"
         )
     # The first two programs compile, the third finds machine code in the cache.
     programs = [["import sys", use, "print(linked.caller(0.0))"] for use in uses]

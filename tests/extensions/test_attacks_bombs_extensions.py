@@ -191,8 +191,10 @@ def test_pipes_and_devices_are_no_files(name, tmp_path):
     (tmp_path / f"zero-{name}").symlink_to("/dev/zero")
     reads = buildings if name in ("a.geojson", "a.xml") else recording
     for path in (tmp_path / name, tmp_path / f"zero-{name}"):
+        # A record of a recording refuses links out of its folder before it looks at the file.
         with pytest.raises(
-            InputError, match="is a pipe, socket or device, expected a regular file"
+            InputError,
+            match=r"is a pipe, socket or device, expected a regular file|a link to /dev/",
         ):
             reads(path)
 

@@ -139,7 +139,7 @@ def test_the_configuration_names_the_source():
     found = stages_of(overlay).recognition.samples(SimpleNamespace(scheme="a-vrp-trp-vt"))
     assert (
         found["dataset"] == "results/default/config.yaml"
-        and len(found["clouds"]) == len(found["surfaces"]) == 40
+        and len(found["clouds"]) == len(found["occluders"]) == 40
     )
     options = given("dataset", "views", "index")
     assert options(None, Inputs(found)) == ["--dataset", "results/default/config.yaml"]

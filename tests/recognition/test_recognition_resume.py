@@ -79,13 +79,15 @@ def test_checkpoints_come_by_the_clock_and_the_time_spent_waiting_for_data_is_to
     assert (record["waiting_share"], record["samples_per_s"], record["train_s"]) == (1.0, 2.0, 12.0)
 
 
-def killed_at(moments, views, folder, settings):
-    """Kill one training at each of the moments, s after its first new checkpoint; what is left of
-    it, as a command.
-    """
+def training_line(views, folder, settings):
+    """A training as the words of a command."""
     settings = json.dumps({**settings, "scheme": SCHEME.record})
     line = ["train", "--settings", settings, "--views", str(views), "--protocol", "seen", "--out"]
-    line.append(str(folder / "killed"))
+    return [*line, str(folder / "killed")]
+
+
+def killed_at(moments, line, folder):
+    """Kill one training at each of the moments, s after its first new checkpoint."""
     kept = folder / "killed" / "checkpoint.pt"
     for moment in moments:
         before = kept.stat().st_mtime_ns if kept.exists() else None
@@ -97,29 +99,40 @@ def killed_at(moments, views, folder, settings):
         time.sleep(moment)
         process.send_signal(signal.SIGKILL)
         assert process.wait() == -signal.SIGKILL
-    return line
 
 
-@pytest.mark.parametrize(
-    ("kills", "steps"),
-    [(1, 24), pytest.param(20, 600, marks=pytest.mark.slow)],
-    ids=["once", "twenty times"],
-)
-def test_a_killed_process_resumes_from_the_command_line(views, tmp_path, capsys, kills, steps):
-    settings = with_training(steps=steps, validate_every=10, checkpoint_s=0)
-    # A single kill comes with the first checkpoint, long before the last of few steps.
-    line = killed_at(
-        stream(2, "kill").uniform(0, 0.3 * (kills > 1), kills), views, tmp_path, settings
-    )
+def resumed(line, views, folder, steps, capsys):
+    """Run the command of a killed training again: it ends as one that was never stopped."""
     main(line)
     assert "resumed at step" in capsys.readouterr().err
-    name, state = model_files.load(tmp_path / "killed" / "model.safetensors")
-    weights, history = train(
-        views, tmp_path / "whole", with_training(steps=steps, validate_every=10)
-    )
+    name, state = model_files.load(folder / "killed" / "model.safetensors")
+    weights, history = train(views, folder / "whole", with_training(steps=steps, validate_every=10))
     assert equal(state["weights"], weights)
-    assert (tmp_path / "killed" / "history.csv").read_text() == history
+    assert (folder / "killed" / "history.csv").read_text() == history
     assert json.loads(name)["protocol"] == "seen"
+
+
+def test_a_stopped_training_resumes_from_the_command_line(views, tmp_path, capsys, monkeypatch):
+    line = training_line(
+        views, tmp_path, with_training(steps=12, validate_every=10, checkpoint_s=0)
+    )
+    step = kill_at(monkeypatch, 5)
+    with pytest.raises(Killed):
+        main(line)
+    monkeypatch.setattr(runs.Trainer, "_step", step)
+    resumed(line, views, tmp_path, 12, capsys)
+
+
+# Every process imports torch. A single kill comes with the first checkpoint, long before the last
+# of few steps.
+@pytest.mark.slow
+@pytest.mark.parametrize(("kills", "steps"), [(1, 24), (20, 600)], ids=["once", "twenty times"])
+def test_a_killed_process_resumes_from_the_command_line(views, tmp_path, capsys, kills, steps):
+    line = training_line(
+        views, tmp_path, with_training(steps=steps, validate_every=10, checkpoint_s=0)
+    )
+    killed_at(stream(2, "kill").uniform(0, 0.3 * (kills > 1), kills), line, tmp_path)
+    resumed(line, views, tmp_path, steps, capsys)
 
 
 def test_foreign_damaged_and_missing_checkpoints_and_models_are_refused_by_name(

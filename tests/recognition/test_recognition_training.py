@@ -238,7 +238,10 @@ def test_a_compiled_network_trains_to_the_same_history(views, tmp_path):
     settings = {**settings, "training": {**settings["training"], "compile": True}}
     # The compiler refuses a process in which another test has imported the distutils that comes
     # with Python.
-    program = "import json, sys; from pathlib import Path; from trainings import train; given = map(Path, sys.argv[1:3])"
+    program = (
+        "import json, sys; from pathlib import Path; from trainings import train; given = map(Path,"
+        " sys.argv[1:3])"
+    )
     program += "; train(*given, json.loads(sys.argv[3]))"
     command = [sys.executable, "-c", program, views, tmp_path / "compiled", json.dumps(settings)]
     ended = subprocess.run(

@@ -115,7 +115,10 @@ def test_a_table_below_ten_rows_sorts_and_scrolls_but_has_neither_filter_nor_dow
 
 
 def test_a_telephone_shows_whole_tiles_plots_and_navigation(tmp_path):
-    tile = '<figure><div class="tile"><div class="down"><span>A</span></div><img alt="a" src="data:,"></div></figure>'
+    tile = (
+        '<figure><div class="tile"><div class="down"><span>A</span></div><img alt="a"'
+        ' src="data:,"></div></figure>'
+    )
     picture = '<svg width="{0}" height="9" viewBox="0 0 {0} 9"></svg>'
     plot = Plot("p", "plot", picture.format(900), [], picture.format(353))
     html = f'<div class="row tiles">{4 * tile}</div>{plotted(plot)}'

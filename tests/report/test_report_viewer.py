@@ -91,7 +91,7 @@ def test_the_truth_of_a_still_target_is_one_line_at_its_folded_speed():
     away = {"x_m": 300.0, "y_m": 0.0, "z_m": 25.0, "vx_mps": 1.5 * largest, "vy_mps": 0.0}
     moving = row(0) | away | {"vz_mps": 0.0, "rate_hz": 0.0}
     cloud = craft()
-    (picture, _) = viewer_truth.truth(cloud, moving, network, np.arange(10))
+    picture, _ = viewer_truth.truth(cloud, moving, network, np.arange(10))
     image = Image.open(io.BytesIO(base64.b64decode(picture.partition(",")[2])))
     assert image.mode == "P" and image.info["transparency"] == 0
     assert image.size == (viewer_truth.COLUMNS, viewer_truth.ROWS)

@@ -155,7 +155,7 @@ def test_a_converter_errs_as_uniform_steps_do_and_clips():
     rng = np.random.default_rng(1)
     samples = rng.standard_normal((50, 32)) + 1j * rng.standard_normal((50, 32))
     found = adc.receive(adc.DEFAULTS | {"bits": 10}, samples, look_of(network()), None)
-    step = adc.full_scale(samples, 12.0) * 2**-9
+    step = adc.full_scale_of(samples, 12.0) * 2**-9
     assert np.mean(abs(found - samples) ** 2) == pytest.approx(step**2 / 6, rel=0.1)
     coarse = adc.quantise(np.array([0.1, 0.9, 3.0, -3.0]) + 0j, 2, 1.0)
     assert coarse.real.tolist() == [0.25, 0.75, 0.75, -0.75]
@@ -174,7 +174,7 @@ def test_only_clipping_costs_a_look_with_strong_symbols_more_than_quantisation()
         # Steps of full scale / 2^7: a component's error has a twelfth of a step's square.
         quantised_db = 10 * np.log10(12 * 2**14) - backoff_db
         power = np.mean(abs(look) ** 2)
-        whole = adc.full_scale(look, backoff_db)
+        whole = adc.full_scale_of(look, backoff_db)
         inside = np.maximum(abs(look.real), abs(look.imag)) < whole
         assert 10 * np.log10(power / np.mean(abs(error) ** 2)) == pytest.approx(
             expected_db, abs=0.3

@@ -22,10 +22,11 @@ from lowalt.files.errors import InputError
 from lowalt.motion.__main__ import main as motion
 from lowalt.noise.__main__ import main as noise
 from lowalt.shards import ShardSet, card
+from lowalt.shards import dataset as module
 from lowalt.shards.__main__ import main as shards
 from lowalt.shards.build import write_run
 from lowalt.shards.dataset import Dataset, Endless
-from lowalt.targets import make, occluders
+from lowalt.targets import occluders
 from lowalt.targets.cloud import read
 from lowalt.targets.cloud import write as write_cloud
 from lowalt.targets.records import records_of
@@ -362,9 +363,11 @@ def test_samples_of_a_scene_that_hides_points_are_made_again_with_its_surfaces(
 
 def test_a_cloud_is_made_once_and_when_a_sample_of_its_target_is_asked_for(monkeypatch):
     made = []
-    whole = make.make
+    whole = module.made_cloud
     monkeypatch.setattr(
-        make, "make", lambda record, *rest: made.append(record["subtype"]) or whole(record, *rest)
+        module,
+        "made_cloud",
+        lambda record, *rest: made.append(record["subtype"]) or whole(record, *rest),
     )
     samples = Dataset(configuration())
     assert len(samples.clouds) == 3 and not made

@@ -104,7 +104,10 @@ def test_a_manifest_by_groups_has_the_checksums_of_sha256sum_and_notices_each_ch
         (run / name).parent.mkdir(exist_ok=True)
         (run / name).write_text(name)
     manifest.main(["write", *options, "--by-groups"])
-    groups = "clouds/*.npz motion/seen-*.csv echo/A/seen-*.npy noisy/seen-*.npy shards/seen-train-*.tar shards/index.json"
+    groups = (
+        "clouds/*.npz motion/seen-*.csv echo/A/seen-*.npy noisy/seen-*.npy shards/seen-train-*.tar"
+        " shards/index.json"
+    )
     assert list(manifest.read(tmp_path / "run.sha256")) == groups.split()
     for pattern, digest in manifest.read(tmp_path / "run.sha256").items():
         again = "| sha256sum" if "*" in pattern else ""

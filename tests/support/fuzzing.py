@@ -308,7 +308,11 @@ def main() -> None:
             fault = f"the process ended with {process.exitcode}"
             rows.append(
                 dict.fromkeys(COLUMNS, 0)
-                | {"reader": reader.name, "faults": 1, "first_fault": fault}
+                | {
+                    "reader": reader.name,
+                    "faults": 1,
+                    "first_fault": fault,
+                }
             )
         else:
             rows.append(queue.get())

@@ -17,9 +17,10 @@ def urdf(
     origin.
     """
     links = "".join(
-        f'<link name="{name}"><visual><geometry><mesh filename="{blade}" scale="0.001 0.001 0.001"/></geometry>'
-        f'</visual></link><joint name="{name}_joint" type="continuous"><origin xyz="{x} {y} 0.05" rpy="0 0 {index}"/>'
-        f'<parent link="base"/><child link="{name}"/><axis xyz="0 0 1"/></joint>'
+        f'<link name="{name}"><visual><geometry><mesh filename="{blade}" scale="0.001 0.001'
+        f' 0.001"/></geometry></visual></link><joint name="{name}_joint" type="continuous"><origin'
+        f' xyz="{x} {y} 0.05" rpy="0 0 {index}"/><parent link="base"/><child link="{name}"/><axis'
+        ' xyz="0 0 1"/></joint>'
         for index, (name, (x, y)) in enumerate(HUBS.items())
     )
     body = f'<link name="base"><visual><geometry>{base}</geometry></visual></link>'
@@ -54,22 +55,22 @@ def car_urdf(turned: bool = False) -> str:
     joints = []
     for name, x, y in (("fl", 1.3, 0.8), ("fr", 1.3, -0.8), ("rl", -1.3, 0.8), ("rr", -1.3, -0.8)):
         links.append(
-            f'<link name="wheel{len(links)}"><visual><origin rpy="1.5707963 0 0"/><geometry><cylinder '
-            'radius="0.3" length="0.2"/></geometry></visual></link>'
+            f'<link name="wheel{len(links)}"><visual><origin rpy="1.5707963 0'
+            ' 0"/><geometry><cylinder radius="0.3" length="0.2"/></geometry></visual></link>'
         )
         parent = "base"
         if name[0] == "f":
             parent = f"knuckle_{len(links)}"
             joints.append(
-                f'<link name="{parent}"/><joint name="steer{len(links)}" type="revolute"><origin '
-                f'xyz="{x} {y} 0.3"/><parent link="base"/><child link="{parent}"/><axis xyz="0 0 1"/>'
-                '<limit lower="-0.5" upper="0.5"/></joint>'
+                f'<link name="{parent}"/><joint name="steer{len(links)}" type="revolute"><origin'
+                f' xyz="{x} {y} 0.3"/><parent link="base"/><child link="{parent}"/><axis xyz="0 0'
+                ' 1"/><limit lower="-0.5" upper="0.5"/></joint>'
             )
             x = y = 0.0
         joints.append(
-            f'<joint name="axle{len(links)}" type="continuous"><origin xyz="{x} {y} '
-            f'{0.3 if parent == "base" else 0}"/><parent link="{parent}"/><child link="wheel{len(links) - 1}"'
-            '/><axis xyz="0 1 0"/></joint>'
+            f'<joint name="axle{len(links)}" type="continuous"><origin xyz="{x} {y}'
+            f' {0.3 if parent == "base" else 0}"/><parent link="{parent}"/><child'
+            f' link="wheel{len(links) - 1}"/><axis xyz="0 1 0"/></joint>'
         )
     helm = (
         '<link name="steering_wheel"><visual><geometry><cylinder radius="0.2" '
@@ -85,7 +86,7 @@ def car_urdf(turned: bool = False) -> str:
     )
     yaw = 1.5707963267948966 if turned else 0
     root = (
-        f'<link name="world"/><joint name="w" type="fixed"><origin rpy="0 0 {yaw}"/><parent link="world"/>'
-        '<child link="base"/></joint>'
+        f'<link name="world"/><joint name="w" type="fixed"><origin rpy="0 0 {yaw}"/><parent'
+        ' link="world"/><child link="base"/></joint>'
     )
     return f'<robot name="car">{root}{base}{"".join(links)}{"".join(joints)}{helm}</robot>'

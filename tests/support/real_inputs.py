@@ -11,5 +11,8 @@ FOLDER = Path(os.environ.get("LOWALT_INPUTS") or Path(__file__).parents[3] / "sh
 
 needs_inputs = pytest.mark.skipif(
     not (FOLDER / "cmu").is_dir() or not (FOLDER / "meshes").is_dir(),
-    reason=f"no real inputs: {FOLDER} lacks cmu/ and meshes/ (set LOWALT_INPUTS to the folder that has them)",
+    reason=(
+        f"no real inputs: {FOLDER} lacks cmu/ and meshes/ (set LOWALT_INPUTS to the folder that has"
+        " them)"
+    ),
 )

@@ -28,7 +28,10 @@ def prism(height: float = 0.1) -> tuple[list, list]:
 
 def ply(vertices: list, faces: list, kind: str, strips: list = ()) -> bytes:
     """A PLY file of a kind (ascii, little, big) with faces of mixed sizes and triangle strips."""
-    head = f"ply\nformat {'ascii' if kind == 'ascii' else f'binary_{kind}_endian'} 1.0\nelement vertex {len(vertices)}\n"
+    head = (
+        f"ply\nformat {'ascii' if kind == 'ascii' else f'binary_{kind}_endian'} 1.0\nelement vertex"
+        f" {len(vertices)}\n"
+    )
     head += "property float x\nproperty float y\nproperty float z\nproperty uchar red\n"
     head += f"element face {len(faces)}\nproperty list uchar int vertex_indices\n"
     head += f"element tristrips {len(strips)}\nproperty list int int vertex_indices\nend_header\n"

@@ -70,11 +70,15 @@ def mitsuba(path: Path, boxes, name: str = "") -> Path:
     """
     ply(path.with_name("cube.ply"), [(0.0, 0.0, 1.0, 1.0, 1.0)])
     shapes = [
-        f'<shape type="ply" id="b{k}"><string name="filename" value="{name or "cube.ply"}"/><transform name="to_world">'
-        f'<scale x="{width}" y="{depth}" z="{height}"/><translate x="{x}" y="{y}"/></transform>'
-        '<ref id="mat-itu_brick" name="bsdf"/></shape>'
+        f'<shape type="ply" id="b{k}"><string name="filename"'
+        f' value="{name or "cube.ply"}"/><transform name="to_world"><scale x="{width}" y="{depth}"'
+        f' z="{height}"/><translate x="{x}" y="{y}"/></transform><ref id="mat-itu_brick"'
+        ' name="bsdf"/></shape>'
         for k, (x, y, width, depth, height) in enumerate(boxes)
     ]
-    bsdf = '<bsdf type="itu-radio-material" id="mat-itu_brick"><string name="type" value="brick"/></bsdf>'
+    bsdf = (
+        '<bsdf type="itu-radio-material" id="mat-itu_brick"><string name="type"'
+        ' value="brick"/></bsdf>'
+    )
     path.write_text(f'<scene version="2.1.0">{bsdf}{"".join(shapes)}<shape type="sphere"/></scene>')
     return path

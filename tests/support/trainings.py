@@ -95,9 +95,10 @@ def sources(path):
 def train(path, folder, settings=SETTINGS):
     """Train into a folder; return the weights and the text of history.csv."""
     runs.train(sources(path), SCHEME, "seen", settings, folder)
-    return model_files.load(folder / "model.safetensors")[1]["weights"], (
-        folder / "history.csv"
-    ).read_text()
+    return (
+        model_files.load(folder / "model.safetensors")[1]["weights"],
+        (folder / "history.csv").read_text(),
+    )
 
 
 def equal(one, other):

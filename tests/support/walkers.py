@@ -71,7 +71,8 @@ def walk(
         way = speed * frame
         lines += [str(frame + 1)]
         lines += [
-            f"root {way * math.sin(heading)!r} {16 + 0.3 * swing**2!r} {way * math.cos(heading)!r} 0 {turn_deg!r} 0"
+            f"root {way * math.sin(heading)!r} {16 + 0.3 * swing**2!r} {way * math.cos(heading)!r}"
+            f" 0 {turn_deg!r} 0"
         ]
         lines += [
             f"lfemur {30 * swing!r} 0 0",

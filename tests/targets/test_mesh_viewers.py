@@ -113,9 +113,18 @@ def test_a_collada_surface_whose_texture_is_missing_is_kept(tmp_path):
     surface = (
         '<newparam sid="s"><surface type="2D"><init_from>gone</init_from></surface></newparam>'
     )
-    more = f'<library_effects><effect id="e"><profile_COMMON>{surface}</profile_COMMON></effect></library_effects>'
-    more += '<library_materials><material id="m"><instance_effect url="#e"/></material></library_materials>'
-    bound = '<instance_geometry url="#g"><bind_material><technique_common><instance_material symbol="M" target="#m"/>'
+    more = (
+        "<library_effects><effect"
+        f' id="e"><profile_COMMON>{surface}</profile_COMMON></effect></library_effects>'
+    )
+    more += (
+        '<library_materials><material id="m"><instance_effect'
+        ' url="#e"/></material></library_materials>'
+    )
+    bound = (
+        '<instance_geometry url="#g"><bind_material><technique_common><instance_material symbol="M"'
+        ' target="#m"/>'
+    )
     text = dae(*prism()).replace("<library_geometries>", f"{more}<library_geometries>")
     text = text.replace("<polylist ", '<polylist material="M" ')
     text = text.replace(

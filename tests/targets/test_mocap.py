@@ -124,6 +124,7 @@ def frozen(text: str) -> str:
         ),
         (frozen, {}, "frame 100 repeats frame 99"),
         (spiked, {}, "frame 100: l(foot|toes) accelerates"),
+        (str, {"max_acceleration_mps2": 1}, "accelerates by .* expected at most 1: a glitch"),
         (str, {"last_frame": 300}, "expected frames 1 to 300"),
         (str, {"first_frame": 400}, "no frame in that range"),
         (lambda text: "not a motion at all", {}, "expected an AMC motion"),

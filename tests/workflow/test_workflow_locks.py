@@ -18,7 +18,16 @@ import pytest
 import snakemake_runs
 from lowalt.files.processes import started
 from lowalt.workflow import locks
-from lowalt.workflow.locks import TOKEN, Owner, guarded, holders, numbers, refusal, take, take_over
+from lowalt.workflow.locks import (
+    TOKEN,
+    Owner,
+    guarded,
+    holders,
+    locked_message,
+    numbers,
+    take,
+    take_over,
+)
 
 ROOT = Path(__file__).parents[2]
 KEYS = {"input": ["in.txt"], "output": ["out.txt"]}
@@ -70,7 +79,7 @@ def test_a_dead_owner_s_lock_is_taken_over_and_all_others_stay(tmp_path):
     assert numbers(tmp_path) == [1, 2, 7]
     assert takers(tmp_path)[:2] == [mine, replace(GONE, host="elsewhere")]
     assert len(said) == 1 and str(GONE.pid) in said[0]
-    text = refusal(tmp_path)
+    text = locked_message(tmp_path)
     assert f"process {os.getpid()} of {mine.host} is running" in text
     assert "host elsewhere, which cannot be seen from here" in text
     assert "7.output.lock: no record of its owner" in text and "--unlock" in text
@@ -96,7 +105,10 @@ def test_jobs_that_outlived_their_run_are_ended_by_force_where_they_do_not_heed_
     tmp_path, monkeypatch
 ):
     monkeypatch.setattr(locks, "GRACE_S", 0.5)
-    program = "import signal, time; signal.signal(signal.SIGTERM, signal.{}); print(1, flush=True); time.sleep(60)"
+    program = (
+        "import signal, time; signal.signal(signal.SIGTERM, signal.{}); print(1, flush=True);"
+        " time.sleep(60)"
+    )
     heeding, stubborn, another = jobs = [
         subprocess.Popen(
             [sys.executable, "-c", program.format(answer)],

@@ -142,7 +142,10 @@ def interrupts():
 
 
 def test_plain_snakemake_takes_every_ctrl_c_as_an_interrupt(interrupts):
-    program = "import signal, snakemake.cli; print(signal.getsignal(signal.SIGINT) is signal.default_int_handler)"
+    program = (
+        "import signal, snakemake.cli; print(signal.getsignal(signal.SIGINT) is"
+        " signal.default_int_handler)"
+    )
     assert (
         subprocess.run([sys.executable, "-c", program], capture_output=True, text=True).stdout
         == "True\n"

@@ -62,7 +62,7 @@ def settings(stages: Stages, job: SimpleNamespace) -> dict[str, str]:
         "shard": stages.shards.settings(job),
         "configuration": stages.shards.configuration(job),
         "cost_table": stages.cost.settings(job),
-        "views": stages.recognition.views(job),
+        "views": stages.recognition.view_settings(job),
         "training": stages.recognition.training(job),
         "evaluation": stages.recognition.evaluation(job),
         "seed": stages.recognition.seed(job),

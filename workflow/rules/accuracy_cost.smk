@@ -6,7 +6,7 @@
 #          results/{run}/accuracy_cost.svg
 from lowalt.workflow.stages.accuracy_cost import AccuracyCostStage
 
-accuracy_cost = Refusing(AccuracyCostStage(RUN))
+accuracy_cost = UserErrorsInOneLine(AccuracyCostStage(RUN))
 
 
 rule speed:

@@ -5,7 +5,7 @@
 from functools import partial
 from pathlib import Path
 
-from lowalt.config.command import Refusing, refusing
+from lowalt.config.command import UserErrorsInOneLine, user_errors_in_one_line
 from lowalt.machine.environment import prepare
 from lowalt.shards.plan import PART, PIECE
 from lowalt.scene.effects import dotted
@@ -18,7 +18,7 @@ from lowalt.workflow.sources import ROOT, code as code_of
 mends.install()
 SCHEMA = workflow.source_path("../schemas/config.schema.yaml")
 config.update(located(config))
-with refusing():
+with user_errors_in_one_line():
     RUN = Run.of(config, SCHEMA, prepare(ROOT, config["inputs"]))
     space.writable(Path.cwd(), RUN.name)
 

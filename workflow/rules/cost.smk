@@ -4,7 +4,7 @@
 # OUTPUTS: results/{run}/cost.csv, results/{run}/cost.svg
 from lowalt.workflow.stages.cost import CostStage
 
-cost = Refusing(CostStage(RUN))
+cost = UserErrorsInOneLine(CostStage(RUN))
 
 
 rule cost_table:

@@ -4,7 +4,7 @@
 # OUTPUTS: results/{run}/echo/{group}-{part}/{station}.npy, complex64 (models, symbols)
 from lowalt.workflow.stages.echo import EchoStage
 
-echo = Refusing(EchoStage(RUN))
+echo = UserErrorsInOneLine(EchoStage(RUN))
 
 
 rule echo:

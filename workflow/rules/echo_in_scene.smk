@@ -7,7 +7,7 @@
 #          {station}.power.npy
 from lowalt.workflow.stages.echo import EchoStage
 
-echo = Refusing(EchoStage(RUN))
+echo = UserErrorsInOneLine(EchoStage(RUN))
 
 
 rule echo_in_scene:

@@ -5,7 +5,7 @@
 # OUTPUTS: results/{run}/motion/{group}-{part}.csv
 from lowalt.workflow.stages.motion import MotionStage
 
-motion = Refusing(MotionStage(RUN))
+motion = UserErrorsInOneLine(MotionStage(RUN))
 
 
 rule motion:

@@ -4,7 +4,7 @@
 # OUTPUTS: results/{run}/noisy/{group}-{part}.npy, complex64 (models, snrs, stations, symbols)
 from lowalt.workflow.stages.noise import NoiseStage
 
-noise = Refusing(NoiseStage(RUN))
+noise = UserErrorsInOneLine(NoiseStage(RUN))
 
 
 rule noise:

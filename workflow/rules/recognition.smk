@@ -6,7 +6,7 @@
 #          models on this run's test samples
 from lowalt.workflow.stages.recognition import RecognitionStage
 
-recognition = Refusing(RecognitionStage(RUN))
+recognition = UserErrorsInOneLine(RecognitionStage(RUN))
 
 
 rule views:
@@ -17,10 +17,11 @@ rule views:
         index=ancient("results/{run}/shards/index.json"),
         shard="results/{run}/shards/{group}-{fold}-{part}{piece}.tar",
         reduced=branch(
-            recognition.is_reduced, then="results/{run}/reduced/{size}/{group}-{part}.npy"
+            recognition.is_made_by_tiles_stage,
+            then="results/{run}/reduced/{size}/{group}-{part}.npy",
         ),
         motion=branch(
-            recognition.is_reduced,
+            recognition.is_made_by_tiles_stage,
             then=expand("results/{{run}}/motion/{source}.csv", source=recognition.source),
         ),
     output:
@@ -32,7 +33,7 @@ rule views:
     conda:
         "../../envs/environment.yaml"
     params:
-        settings=recognition.views,
+        settings=recognition.view_settings,
         render=shards.index_settings,
         reduced=given("reduced", "motion"),
     shell:

@@ -5,7 +5,7 @@
 #          results/{run}/stages.csv, results/{run}/figures (each plot as SVG and CSV)
 from lowalt.workflow.stages.report import ReportStage
 
-page = Refusing(ReportStage(RUN))
+page = UserErrorsInOneLine(ReportStage(RUN))
 
 
 rule report_manifest:

@@ -7,7 +7,7 @@
 #          croissant.json, SHA256SUMS
 from lowalt.workflow.stages.shards import ShardsStage
 
-shards = Refusing(ShardsStage(RUN))
+shards = UserErrorsInOneLine(ShardsStage(RUN))
 
 
 rule shard:

@@ -4,7 +4,7 @@
 # OUTPUTS: results/{run}/clouds/{subtype}.npz, results/{run}/clouds.png
 from lowalt.workflow.stages.targets import TargetsStage
 
-targets = Refusing(TargetsStage(RUN))
+targets = UserErrorsInOneLine(TargetsStage(RUN))
 
 
 rule cloud:

@@ -6,7 +6,7 @@
 #          every size of tiles.reduced results/{run}/reduced/{size}/{group}-{part}.npy
 from lowalt.workflow.stages.tiles import TilesStage
 
-tiles = Refusing(TilesStage(RUN))
+tiles = UserErrorsInOneLine(TilesStage(RUN))
 
 
 rule tiles:

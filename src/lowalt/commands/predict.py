@@ -6,7 +6,7 @@ from pathlib import Path
 from types import ModuleType
 
 from lowalt.commands.command_line import Answer, add_command
-from lowalt.config.command import name_backbone
+from lowalt.config.command import add_backbone_option
 from lowalt.config.extensions import module_offered, offered
 from lowalt.config.layers import overlaid
 from lowalt.files.atomic import existing
@@ -28,7 +28,7 @@ def add_to(commands: argparse._SubParsersAction, name: str) -> None:
         help="tile (.png), signals (stations, symbols) complex (.npy), or a "
         "recording's record (.yaml)",
     )
-    name_backbone(line)
+    add_backbone_option(line)
     line.add_argument(
         "--overlay", type=Path, nargs="+", default=[], help="overlays of the run that trained it"
     )

@@ -59,8 +59,8 @@ def refuse_weights(weights: object, where: str | Path, how: str) -> None:
     """
     if weights != "none":
         raise InputError(
-            f"{where}: its weights {shown(weights)} come from elsewhere, which a file may not choose; "
-            f"expected {how}"
+            f"{where}: its weights {shown(weights)} come from elsewhere, which a file may not"
+            f" choose; expected {how}"
         )
 
 

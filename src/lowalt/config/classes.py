@@ -35,8 +35,8 @@ def refuse_subtype(name: object, where: str | Path) -> None:
     """
     if not isinstance(name, str) or not _SUBTYPE.fullmatch(name):
         raise InputError(
-            f"{where}: the subtype's name is {shown(name)}, expected a letter or digit, then at most "
-            "79 letters, digits, spaces or _.,:+()/&'#-"
+            f"{where}: the subtype's name is {shown(name)}, expected a letter or digit, then at"
+            " most 79 letters, digits, spaces or _.,:+()/&'#-"
         )
 
 

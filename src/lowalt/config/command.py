@@ -23,7 +23,7 @@ from lowalt.files.errors import (
     InputWarning,
     in_one_line,
     in_plain_characters,
-    lacking,
+    missing_package,
     shortened,
 )
 from lowalt.files.json_objects import json_object
@@ -51,9 +51,12 @@ def parser(module: str, description: str | None) -> argparse.ArgumentParser:
     return result
 
 
-def name_backbone(line: argparse.ArgumentParser) -> None:
-    """Add the option for the code of a model's backbone, which the model's file may not choose."""
-    line.add_argument(
+def add_backbone_option(parser: argparse.ArgumentParser) -> None:
+    """Add the option with which the user names the code of a model's backbone.
+
+    The model's own file may not choose it, because a stranger's file could then run any code.
+    """
+    parser.add_argument(
         "--backbone",
         default="",
         metavar="FILE.py:FUNCTION",
@@ -107,7 +110,7 @@ def dispatch(
     commands[arguments[0]](arguments[1:])
 
 
-REFUSED = (
+PATH_ERRORS = (
     errno.EROFS,
     errno.EACCES,
     errno.EPERM,
@@ -119,16 +122,16 @@ REFUSED = (
 """Operating system errors caused by a path of the user, such as a read-only folder."""
 
 
-REFUSALS = (InputError, OSError, ImportError, MemoryError)
-"""Errors that become one sentence, as far as `refusal` knows them."""
+USER_ERRORS = (InputError, OSError, ImportError, MemoryError)
+"""Types of errors that the user can cause and mend; `error_sentence` has a sentence for most."""
 
 
-def refusal(error: InputError | OSError | ImportError | MemoryError) -> str:
-    """Return the message of a refusal, of bounded length.
+def error_sentence(error: InputError | OSError | ImportError | MemoryError) -> str:
+    """Return one sentence of bounded length for an error that the user can mend.
 
-    It is that of an InputError, one about the path in an error of the operating system, about a
-    full disk or output, about memory, or about a package that is not installed. Raises: any other
-    error unchanged.
+    Such are an InputError, a path that the operating system refuses, a full disk or output, too
+    little memory, and a package that is not installed.
+    Raises: any other error of these types unchanged.
     """
     if isinstance(error, MemoryError):
         return f"memory: not enough ({in_one_line(error)}), expected more of it, or a smaller input"
@@ -137,60 +140,64 @@ def refusal(error: InputError | OSError | ImportError | MemoryError) -> str:
     if isinstance(error, InputError):
         return str(error)
     if isinstance(error, ImportError):
-        return str(lacking(error))
-    if error.errno not in REFUSED or error.filename is None:
+        return str(missing_package(error))
+    if error.errno not in PATH_ERRORS or error.filename is None:
         raise error
-    refused = (
+    sentence = (
         f"{error.filename}: {error.strerror}, expected a file or folder that this user may read "
         "or write"
     )
-    return shortened(in_plain_characters(refused))
+    return shortened(in_plain_characters(sentence))
 
 
 def drop_output() -> None:
-    """Let what is still to be written on standard output go nowhere: Python would try again when it
-    ends.
+    """Discard what is still to be written on standard output.
+
+    Python would try to write it again when it ends, and fail again.
     """
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 @contextlib.contextmanager
-def refusing() -> Iterator[None]:
-    """Turn what `refusal` knows, such as an InputError or a full output, into a line and status 2."""
+def user_errors_in_one_line() -> Iterator[None]:
+    """Print an error that the user can mend as one line, and exit with status 2.
+
+    Raises: SystemExit after that line; any other error unchanged.
+    """
     try:
         try:
             yield
         finally:
             sys.stdout.flush()
-    except REFUSALS as error:
+    except USER_ERRORS as error:
         if isinstance(error, OSError) and error.errno in FULL:
             drop_output()
-        print(f"error: {refusal(error)}", file=sys.stderr)
+        print(f"error: {error_sentence(error)}", file=sys.stderr)
         raise SystemExit(2) from None
 
 
-class Refusing:
-    """Wraps an object whose methods then handle errors as `refusing` does.
+class UserErrorsInOneLine:
+    """Wraps an object whose methods then handle errors as `user_errors_in_one_line` does.
 
-    Snakemake would print tracebacks.
+    Snakemake calls the methods of stages itself and would print tracebacks.
     """
 
-    def __init__(self, held: object) -> None:
+    def __init__(self, wrapped: object) -> None:
         """Take the object."""
-        self._held = held
+        self._wrapped = wrapped
 
     def __getattr__(self, name: str) -> Any:
-        held = getattr(self._held, name)
-        if not callable(held):
-            return held
+        member = getattr(self._wrapped, name)
+        if not callable(member):
+            return member
 
-        @functools.wraps(held)
-        def asked(*given: Any, **named: Any) -> Any:
+        @functools.wraps(member)
+        def method(*arguments: Any, **named: Any) -> Any:
             """Return the method's result, or exit after one line."""
-            with refusing():
-                return held(*given, **named)
+            with user_errors_in_one_line():
+                return member(*arguments, **named)
 
-        return asked
+        return method
 
 
 USUAL_FORMAT = warnings.formatwarning
@@ -202,26 +209,29 @@ def warn_in_one_line() -> None:
     Warnings of libraries are not printed, unless `python -W` or PYTHONWARNINGS asks for warnings.
     """
     if not sys.warnoptions:
-        # What a library finds odd in a file stands in front of the sentence that says it.
+        # Otherwise a library's warnings about a file would stand in front of the sentence about it.
         warnings.simplefilter("ignore")
         warnings.simplefilter("default", InputWarning)
 
-    def in_one_line(message: Any, category: Any, *where: Any, **more: Any) -> str:
-        """The text of a warning."""
+    def formatted(message: Any, category: Any, *where: Any, **more: Any) -> str:
+        """Return the text of a warning."""
         if issubclass(category, InputWarning):
             return f"warning: {message}\n"
         return USUAL_FORMAT(message, category, *where, **more)
 
-    warnings.formatwarning = in_one_line
+    warnings.formatwarning = formatted
 
 
 def run(main: Callable[[list[str]], None]) -> None:
     """Run a stage's `main` on the process's arguments; errors and warnings become one line."""
     end_with_starter()
+    # Most stages free and allocate arrays of the same sizes for each sample.
     keep_freed_memory()
     warn_in_one_line()
-    with refusing():
+    with user_errors_in_one_line():
         main(sys.argv[1:])
     # ru_maxrss includes short peaks that sampling misses; it is in KiB on Linux.
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-    print(f"{Path(sys.argv[0]).parent.name}: done, peak memory {peak:.0f} MiB", file=sys.stderr)
+    # `python -m lowalt.STAGE` starts the file lowalt/STAGE/__main__.py.
+    stage = Path(sys.argv[0]).parent.name
+    print(f"{stage}: done, peak memory {peak:.0f} MiB", file=sys.stderr)

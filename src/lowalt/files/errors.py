@@ -8,24 +8,30 @@ import warnings
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from types import FrameType
 
 
 def instead(unknown: Iterable[object], known: Iterable[str], otherwise: str = "") -> str:
-    """Return what was expected instead of unknown names, in words.
+    """Return in words what was expected instead of unknown names.
 
-    These are the similar ones among the known names, else `otherwise`, else all known names.
+    These are the known names that are similar to an unknown one. If none is similar, it is the text
+    `otherwise` or, without such a text, all known names.
     """
     known = list(known)
-    near: dict[str, None] = {}
+    similar: list[str] = []
     for name in unknown:
-        near |= dict.fromkeys(difflib.get_close_matches(str(name), known, 1))
-    if near:
-        return f"perhaps {list(near)}"
+        nearest = difflib.get_close_matches(str(name), known, n=1)
+        similar += [match for match in nearest if match not in similar]
+    if similar:
+        return f"perhaps {similar}"
     return otherwise or f"only {known}"
 
 
 LONGEST = 400
 """Largest number of characters in an error message, whatever a file contains."""
+LONGEST_VALUE = LONGEST // 2
+"""Largest number of characters of one value, or of a library's message, within such a message."""
+_GAP = " ... "
 
 
 def shortened(text: str, longest: int = LONGEST) -> str:
@@ -36,26 +42,29 @@ def shortened(text: str, longest: int = LONGEST) -> str:
     if len(text) <= longest:
         return text
     start = 2 * longest // 3
-    end = longest - start - len(" ... ")
-    return f"{text[:start]} ... {text[-end:]}"
+    end = longest - start - len(_GAP)
+    return f"{text[:start]}{_GAP}{text[-end:]}"
 
 
 def in_plain_characters(text: str) -> str:
-    """Return a text whose control characters, and others that a terminal obeys instead of showing,
-    are written as escapes such as \\x1b; line ends and tabs stay.
+    """Return a text with escapes such as \\x1b instead of characters that a terminal obeys.
+
+    Line ends and tabs stay as they are.
     """
     if text.isprintable():
         return text
-    return "".join(
-        sign if sign.isprintable() or sign in "\n\t" else sign.encode("unicode_escape").decode()
-        for sign in text
-    )
+    shown_characters = []
+    for character in text:
+        if not character.isprintable() and character not in "\n\t":
+            character = character.encode("unicode_escape").decode()
+        shown_characters.append(character)
+    return "".join(shown_characters)
 
 
 def shown(value: object) -> str:
-    """Return a value of a file as text of at most 200 characters."""
+    """Return a value of a file as text of at most LONGEST_VALUE characters."""
     try:
-        return shortened(repr(value), LONGEST // 2)
+        return shortened(repr(value), LONGEST_VALUE)
     except (RecursionError, ValueError):
         # Values are nested too deeply, or a number has more than 4300 digits.
         return f"a {type(value).__name__} too large to show"
@@ -80,6 +89,20 @@ class SpaceError(InputError):
     """A disk or memory is too small; the message names the required and the free space."""
 
 
+def _packages_of_extras() -> Iterator[tuple[str, str]]:
+    """Yield each package that an extra of this package asks for, and the name of the extra.
+
+    The package is written as pip takes it, such as "snakemake>=9.23".
+    """
+    from importlib.metadata import requires  # takes 30 ms, which no other call should pay
+
+    for requirement in requires("lowalt") or ():
+        package, _, condition = requirement.partition(";")
+        extra = re.search(r"extra == .([\w-]+)", condition)
+        if extra:
+            yield package.strip(), extra[1]
+
+
 def install_command(extra: str) -> str:
     """Return the command that installs the packages of an extra of this package.
 
@@ -87,29 +110,24 @@ def install_command(extra: str) -> str:
     `lowalt[extra]`: no index holds that name, so whoever registered it could run code on the user's
     machine.
     """
-    from importlib.metadata import requires  # takes 30 ms, which no other call should pay
-
-    packages = []
-    for requirement in requires("lowalt") or ():
-        package, _, condition = requirement.partition(";")
-        if re.search(rf"extra == .{extra}\b", condition):
-            packages.append(shlex.quote(package.strip()))
-    return f"pip install {' '.join(packages)}"
+    wanted = [package for package, its_extra in _packages_of_extras() if its_extra == extra]
+    return f"pip install {shlex.join(wanted)}"
 
 
-def lacking(error: ImportError) -> InputError:
-    """Return the refusal of what needs a missing package, with the command that installs it.
+def missing_package(error: ImportError) -> InputError:
+    """Return the error that names a missing package and the command that installs it.
 
-    Raises: the error unchanged where no extra of this package names that one.
+    Raises: the given error unchanged if no extra of this package contains the missing one.
     """
-    from importlib.metadata import requires  # takes 30 ms, which no other call should pay
-
     name = (error.name or "").partition(".")[0]
-    for requirement in requires("lowalt") or ():
-        found = re.match(r"([\w-]+).*extra == .(\w+)", requirement)
-        if found and found[1].replace("-", "_") == name and found[2] != "test":
+    for package, extra in _packages_of_extras():
+        # The extra `test` repeats packages that a user needs from the extras of their purpose.
+        if extra == "test":
+            continue
+        distribution = re.match(r"[\w-]+", package)
+        if distribution and distribution[0].replace("-", "_") == name:
             return InputError(
-                f"the package {name} is not installed, expected `{install_command(found[2])}`"
+                f"the package {name} is not installed, expected `{install_command(extra)}`"
             )
     raise error
 
@@ -118,8 +136,9 @@ def lacking(error: ImportError) -> InputError:
 def reading(path: str | Path, kind: str) -> Iterator[None]:
     """Turn any exception of a reader into an InputError that names the file.
 
-    Libraries raise many types. Raises: InputError, the reader's own, or that the file is not a
-    readable `kind`.
+    Any exception, because libraries raise many types for a faulty file.
+    Raises: InputError with the reader's own message if it raised one, otherwise one which says that
+    the file is not a readable `kind`.
     """
     try:
         yield
@@ -136,22 +155,24 @@ def reading(path: str | Path, kind: str) -> Iterator[None]:
 
 def in_one_line(error: Exception) -> str:
     """Return what a library's error says, as one line of bounded length."""
-    return " ".join(str(error).split())[:200]
+    return " ".join(str(error).split())[:LONGEST_VALUE]
 
 
 class InputWarning(UserWarning):
     """The user's input looks wrong but is used unchanged; the message says what and where."""
 
 
+def _is_inside_package(frame: FrameType) -> bool:
+    """Return whether a frame runs code of this package, or of contextlib, which stands between."""
+    module = frame.f_globals.get("__name__", "")
+    return module.partition(".")[0] in (__name__.partition(".")[0], "contextlib")
+
+
 def warn(text: str) -> None:
     """Warn with `InputWarning` at the line outside this package that called it."""
     level = 1
     frame = sys._getframe()
-    package = __name__.partition(".")[0]
-    while frame.f_back and frame.f_globals.get("__name__", "").partition(".")[0] in (
-        package,
-        "contextlib",
-    ):
+    while frame.f_back and _is_inside_package(frame):
         level = level + 1
         frame = frame.f_back
     warnings.warn(in_plain_characters(text), InputWarning, stacklevel=level)

@@ -6,7 +6,7 @@ from argparse import ArgumentParser, Namespace
 from functools import partial
 from pathlib import Path
 
-from lowalt.config.command import dispatch, name_backbone, parser, pick, run
+from lowalt.config.command import add_backbone_option, dispatch, parser, pick, run
 from lowalt.files.atomic import replacing
 from lowalt.files.errors import InputError
 from lowalt.files.yaml_files import load_yaml
@@ -125,7 +125,7 @@ def _evaluate(arguments: list[str]) -> None:
     line = parser("lowalt.recognition evaluate", _evaluate.__doc__)
     _add_source(line)
     line.add_argument("--model", required=True, help="model.safetensors of a training run")
-    name_backbone(line)
+    add_backbone_option(line)
     line.add_argument(
         "--trained-on",
         default="",
@@ -245,7 +245,7 @@ def _export(arguments: list[str]) -> None:
 
     line = parser("lowalt.recognition export", _export.__doc__)
     line.add_argument("--model", required=True, help="model.safetensors of a training run")
-    name_backbone(line)
+    add_backbone_option(line)
     line.add_argument(
         "--out", required=True, help="file to write: .safetensors (and its card, .md) or .onnx"
     )

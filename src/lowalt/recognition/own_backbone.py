@@ -12,7 +12,7 @@ import sys
 import torch
 from torch import nn
 
-from lowalt.config.named_code import file_of
+from lowalt.config.named_code import file_and_function, file_of
 from lowalt.files.errors import InputError
 
 MIDDLE = {"mean": (0.5, 0.5, 0.5), "std": (0.5, 0.5, 0.5)}
@@ -33,7 +33,7 @@ def backbone(name: str, size: int) -> nn.Module:
             f"network: backbone {name!r}: no file {path}, expected FILE.py:FUNCTION of a file that "
             "exists"
         )
-    _, _, function = name.rpartition(":")
+    _, function = file_and_function(name)
     specification = importlib.util.spec_from_file_location(f"lowalt_own_{path.stem}", path)
     if specification is None or specification.loader is None:
         raise InputError(f"network: backbone {name!r}: {path} is no Python file")

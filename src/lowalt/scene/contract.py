@@ -7,8 +7,8 @@ names by its path. It defines SOURCE, where its law comes from; DEFAULTS, every 
 value; and one or more of the functions `OFFERS`. Each takes `settings`, which hold every key of
 DEFAULTS, and then the arguments that `takes` lists. It may also define
 
-- IDLE, a list of settings that change nothing: where all values of an entry are set, the effect is
-  dropped;
+- IDLE, a list of sets of settings: where a scene's settings hold all values of one set, the effect
+  changes nothing and is left out of the chain;
 - `check(settings, scene)`, which raises InputError where settings contradict the rest of a
   `checks.CheckedScene`;
 - UNMODELLED, what the effect is not modelled with: "links" between two stations, the waveforms

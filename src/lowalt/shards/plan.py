@@ -95,6 +95,11 @@ class Chunk:
     first: int
     count: int
 
+    @property
+    def holds_first_model(self) -> bool:
+        """Whether the chunk holds the first motion model of each of its subtypes."""
+        return self.first == 0
+
 
 @dataclass(frozen=True)
 class Plan:

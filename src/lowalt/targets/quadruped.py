@@ -8,6 +8,8 @@ share of stance (0.42): Hildebrand 1968, J Mammalogy 49, 353-360. Lengths in hei
 and the sway of back, head and tail: estimates.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from lowalt.files.errors import InputError
@@ -27,6 +29,36 @@ LIFT = 0.16
 """Height of a foot in mid swing, in heights at the withers."""
 
 
+class Leg(NamedTuple):
+    """A leg: lengths and positions in heights at the withers; estimates.
+
+    joints: names from the top down; x, y, z: where its top joint stands, to the right, to the front
+    and up; upper, lower: lengths of its bones; bend: as for `skeleton.joint`; start: its phase in
+    frame 0, in strides after its foot has met the ground.
+    """
+
+    name: str
+    joints: tuple[str, str, str, str]
+    x: float
+    y: float
+    z: float
+    upper: float
+    lower: float
+    bend: float
+    start: float
+
+
+_FORE = ("shoulder", "elbow", "wrist", "paw")
+_HIND = ("hip", "knee", "hock", "paw")
+LEGS = (
+    Leg("right fore", _FORE, 0.13, 0.42, 0.74, upper=0.36, lower=0.44, bend=-1.0, start=0.0),
+    Leg("left fore", _FORE, -0.13, 0.42, 0.74, upper=0.36, lower=0.44, bend=-1.0, start=0.5),
+    Leg("right hind", _HIND, 0.13, -0.5, 0.8, upper=0.42, lower=0.44, bend=1.0, start=0.5),
+    Leg("left hind", _HIND, -0.13, -0.5, 0.8, upper=0.42, lower=0.44, bend=1.0, start=0.0),
+)
+"""In a trot the left fore leg steps with the right hind leg, and the other two step together."""
+
+
 def stride_hz(mass_kg: float, speed_mps: float) -> float:
     """Return the stride rate (Hz) of a trot.
 
@@ -34,14 +66,17 @@ def stride_hz(mass_kg: float, speed_mps: float) -> float:
 
     Source: the module's; the root is an estimate between a fixed rate and a fixed stride.
     """
-    fastest = 5.5 * portable.power(mass_kg, 0.24) / 3.6
-    return float(269 / 60 / portable.power(mass_kg, 0.14) * np.sqrt(speed_mps / fastest))
+    # From km/h to m/s, and from strides a minute to strides a second.
+    gallop_mps = 5.5 * portable.power(mass_kg, 0.24) / 3.6
+    gallop_hz = 269 / 60 / portable.power(mass_kg, 0.14)
+    return float(gallop_hz * np.sqrt(speed_mps / gallop_mps))
 
 
 def _foot(phase: np.ndarray, stride_m: float, lift_m: float) -> np.ndarray:
-    """A foot's path (F, 3) about the point below its joint.
+    """Return a foot's path (F, 3) about the point below its joint (m).
 
-    It goes back at the ground's speed, then forward in the air.
+    phase (F,): in strides after the foot meets the ground. It goes back at the ground's speed, then
+    forward in the air.
     """
     at = phase % 1.0
     half = STANCE * stride_m / 2
@@ -91,29 +126,17 @@ def cycle_m(
     sway = portable.sine_cosine_turns(phase)[0]
     nodes = {name: still + h * np.array(shares) + bob for name, shares in _TRUNK.items()}
     nodes["nose"] = nodes["nose"] + 0.03 * h * sine[:, None] * [0, 0, 1.0]
-    nodes["tail tip"] = nodes["tail"] + h * np.stack(
-        [0.06 * sway, np.full(frames, -0.25), 0.04 * sine + 0.02], 1
-    )
-    # Left fore with right hind, right fore with left hind.
-    for name, x, y, upper, lower, bend, later in (
-        ("right fore", 0.13, 0.42, 0.36, 0.44, -1.0, 0.0),
-        ("left fore", -0.13, 0.42, 0.36, 0.44, -1.0, 0.5),
-        ("right hind", 0.13, -0.5, 0.42, 0.44, 1.0, 0.5),
-        ("left hind", -0.13, -0.5, 0.42, 0.44, 1.0, 0.0),
-    ):
-        if "fore" in name:
-            height = 0.74
-            words = ("shoulder", "elbow", "wrist", "paw")
-        else:
-            height = 0.8
-            words = ("hip", "knee", "hock", "paw")
-        top = still + h * np.array([x, y, height]) + bob
-        foot = still + h * np.array([x, y, 0.02]) + _foot(phase + later, stride, LIFT * h)
+    wag = np.stack([0.06 * sway, np.full(frames, -0.25), 0.04 * sine + 0.02], 1)
+    nodes["tail tip"] = nodes["tail"] + h * wag
+    for leg in LEGS:
+        top = still + h * np.array([leg.x, leg.y, leg.z]) + bob
+        step = _foot(phase + leg.start, stride, LIFT * h)
+        foot = still + h * np.array([leg.x, leg.y, 0.02]) + step
         wrist = foot + h * np.array([0, -0.03, 0.08])
         try:
-            middle = joint(top, wrist, upper * h, lower * h, bend)
+            middle = joint(top, wrist, leg.upper * h, leg.lower * h, leg.bend)
         except InputError as error:
             raise InputError(f"quadruped of {height_m} m at {speed_mps} m/s: {error}") from None
-        for word, positions in zip(words, (top, middle, wrist, foot), strict=True):
-            nodes[f"{name} {word}"] = positions
+        for name, positions in zip(leg.joints, (top, middle, wrist, foot), strict=True):
+            nodes[f"{leg.name} {name}"] = positions
     return np.stack(list(nodes.values()), 1), tuple(nodes), duration, stride

@@ -168,9 +168,9 @@ def joint(
 
 
 def circle(turns: np.ndarray, radius_m: float) -> np.ndarray:
-    """Return points (F, 3) of a circle about x that turns as a wheel which rolls to the front.
+    """Return points (F, 3) on a circle about x, which turns as a wheel that rolls to the front.
 
-    It goes up, front, down. turns (F,): angle in turns, 0 at the top.
+    turns (F,): angle in turns, 0 at the top, a quarter at the front (+y).
     """
     sine, cosine = portable.sine_cosine_turns(turns)
     return radius_m * np.stack([np.zeros(len(turns)), sine, cosine], 1)

@@ -27,27 +27,30 @@ def lines(folder: Path) -> list[str]:
     """
     config = located(load_yaml(folder / "config.yaml"))
     ours = averages(folder / "accuracy.csv")
-    paper = averages(config["report"]["published"])
+    papers = averages(config["report"]["published"])
     result = []
     if ours:
-        last, _ = list(ours)[-1]
-        said = []
+        last_scheme, _ = list(ours)[-1]
+        by_protocol = []
         for (scheme, protocol), percent in ours.items():
-            if scheme != last:
+            if scheme != last_scheme:
                 continue
             accuracy = f"{protocol} {percent:.1f} %"
-            if (scheme, protocol) in paper:
-                accuracy += f" (paper {paper[scheme, protocol]:.1f})"
-            said.append(accuracy)
-        result.append(f"accuracy of {last}: {', '.join(said)}")
+            if (scheme, protocol) in papers:
+                accuracy += f" (paper {papers[scheme, protocol]:.1f})"
+            by_protocol.append(accuracy)
+        result.append(f"accuracy of {last_scheme}: {', '.join(by_protocol)}")
+    # The command beside this Python, as the user would type it here.
     command = Path(sys.executable).with_name("lowalt")
-    shown = command.relative_to(Path.cwd()) if command.is_relative_to(Path.cwd()) else command.name
+    typed = command.name
+    if command.is_relative_to(Path.cwd()):
+        typed = str(command.relative_to(Path.cwd()))
     more = "run config/scenes/urban.yaml: the same with multipath, clutter and hardware faults"
     if config["targets"]["select"]:
         more = "run: all subtypes, as in the paper"
     return [
         *result,
         f"page: {folder / 'report.html'}",
-        f"next: {shown} {more}",
-        f"      {shown} sample Crow 3 --snr 13 --out samples: one sample as files and as a picture",
+        f"next: {typed} {more}",
+        f"      {typed} sample Crow 3 --snr 13 --out samples: one sample as files and as a picture",
     ]

@@ -1,6 +1,6 @@
 """Locks that end with their run: a record next to each pair of Snakemake's lock files.
 
-The run holds the record locked.
+A run holds a file lock on its record while it is alive.
 Snakemake locks a working directory with files, which remain when it is killed. The operating system
 releases a file lock when its holder ends for any reason. The next run can therefore remove the lock
 files of a dead run and end its orphaned jobs, and it refuses to start while another run is alive.
@@ -53,14 +53,21 @@ class Owner:
         return self.host == socket.gethostname()
 
     def left_behind(self) -> list[int]:
-        """Ids of processes here with the owner's token; of a dead owner, its orphaned jobs."""
+        """Return the ids of other processes on this host that have the owner's token.
+
+        If the owner is dead, they are its orphaned jobs.
+        """
         mark = f"{TOKEN}={self.token}".encode()
         jobs = []
         for folder in Path("/proc").glob("[0-9]*"):
-            with contextlib.suppress(OSError):
-                marked = mark in (folder / "environ").read_bytes().split(b"\0")
-                if marked and int(folder.name) != os.getpid() and state(int(folder.name)) != "Z":
-                    jobs.append(int(folder.name))
+            pid = int(folder.name)
+            try:
+                variables = (folder / "environ").read_bytes().split(b"\0")
+            except OSError:
+                # The process has ended, or it is another user's.
+                continue
+            if mark in variables and pid != os.getpid() and state(pid) != "Z":
+                jobs.append(pid)
         return jobs
 
 
@@ -70,7 +77,7 @@ def guarded(folder: Path) -> FileLock:
 
 
 def record(locks: Path, number: int) -> Path:
-    """File with a lock's owner; the owner keeps it locked while it is alive."""
+    """Return the path of the record of a lock's owner, who keeps it locked while alive."""
     return locks / f"{number}.owner.json"
 
 
@@ -117,10 +124,10 @@ def take_over(locks: Path, say: Callable[[str], None]) -> None:
 def end(owner: Owner) -> list[int]:
     """End the orphaned processes of a dead run, which would write files of the next; return ids."""
     ended = owner.left_behind()
-    for number in (signal.SIGTERM, signal.SIGKILL):
+    for ending in (signal.SIGTERM, signal.SIGKILL):
         for pid in owner.left_behind():
             with contextlib.suppress(ProcessLookupError):
-                os.kill(pid, number)
+                os.kill(pid, ending)
         stop = time.monotonic() + GRACE_S
         while owner.left_behind() and time.monotonic() < stop:
             time.sleep(0.05)
@@ -152,7 +159,7 @@ def holders(locks: Path, living: bool = False) -> list[str]:
     return lines
 
 
-def refusal(locks: Path) -> str:
+def locked_message(locks: Path) -> str:
     """Return one line about the holders of the locks of a folder and what the user can do."""
     away = "if nothing of this runs any more: snakemake --unlock"
     return f"the working directory is locked: {'; '.join([*holders(locks), away])}"

@@ -17,11 +17,20 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
-from lowalt.config.command import refusing
+from lowalt.config.command import user_errors_in_one_line
 from lowalt.files.atomic import FULL
 from lowalt.files.errors import InputError
 from lowalt.machine.run_pipe import end_with_starter, hold_pipe
-from lowalt.workflow.locks import TOKEN, Owner, drop, guarded, holders, refusal, take, take_over
+from lowalt.workflow.locks import (
+    TOKEN,
+    Owner,
+    drop,
+    guarded,
+    holders,
+    locked_message,
+    take,
+    take_over,
+)
 
 
 def install() -> None:
@@ -62,12 +71,12 @@ def _lock(self: Any) -> Iterator[None]:
     folder = Path(self.path)
     locks = Path(self._lockdir)
     owner = Owner()
-    with refusing():
+    with user_errors_in_one_line():
         try:
             with guarded(folder):
                 take_over(locks, logger.warning)
                 if self.locked:
-                    raise InputError(refusal(locks))
+                    raise InputError(locked_message(locks))
                 keys = {
                     "input": [*map(str, self.all_inputfiles())],
                     "output": [*map(str, self.all_outputfiles())],
@@ -89,7 +98,7 @@ def _lock_warn_only(self: Any) -> Iterator[None]:
     from snakemake.logging import logger
 
     if self.locked:
-        logger.info(refusal(Path(self._lockdir)))
+        logger.info(locked_message(Path(self._lockdir)))
     yield
 
 
@@ -98,7 +107,7 @@ def _cleanup_locks(self: Any) -> None:
 
     Raises: SystemExit after one line that names a living holder.
     """
-    with refusing(), guarded(Path(self.path)):
+    with user_errors_in_one_line(), guarded(Path(self.path)):
         alive = holders(Path(self._lockdir), living=True)
         if alive:
             raise InputError("not unlocked: " + "; ".join(alive))

@@ -12,7 +12,7 @@ from pathlib import Path
 from lowalt.config.brought import OF_TRAINING, refuse_brought
 from lowalt.config.classes import AIRBORNE, CATEGORIES
 from lowalt.config.layers import plain
-from lowalt.config.named_code import file_of, own_effects
+from lowalt.config.named_code import file_and_function, file_of, own_effects
 from lowalt.config.network import SPEED_OF_LIGHT, Network, masts_m, station_names
 from lowalt.files.atomic import slug
 from lowalt.files.errors import InputError
@@ -110,22 +110,27 @@ def refuse_sizes(config: dict, classes: tuple[str, ...] = tuple(CATEGORIES)) -> 
         )
 
 
+SIMULATED_ON_ACCESS = "dataset"
+"""Value of `recognition.input` with which trainings read no shards but simulate their samples."""
+
+
 def refuse_input(config: dict) -> None:
     """Refuse a cache of images simulated on access, and recipe shards without clean echoes."""
     if config["shards"]["kind"] == "recipe":
         refuse(config["effects"])
     block = config["recognition"]
+    if block.get("input") != SIMULATED_ON_ACCESS:
+        return
     own = own_effects(config["effects"])
-    if block.get("input") == "dataset" and own:
+    if own:
         raise InputError(
             f"recognition.input: 'dataset' together with the effects {own}, expected shards"
         )
-    if block.get("input") == "dataset":
-        # The jobs read the run's own config.yaml, which may be a stranger's for all they know.
-        unused = ("inputs", *OF_TRAINING)
-        used = {key: value for key, value in config.items() if key not in unused}
-        refuse_brought(used, "recognition.input: 'dataset'")
-    if block.get("input") == "dataset" and block["cache"]:
+    # The jobs read the run's own config.yaml, which may be a stranger's for all they know.
+    unused = ("inputs", *OF_TRAINING)
+    used = {key: value for key, value in config.items() if key not in unused}
+    refuse_brought(used, "recognition.input: 'dataset'")
+    if block["cache"]:
         raise InputError(
             "recognition.input: 'dataset' together with recognition.cache true, expected cache: "
             "false"
@@ -213,7 +218,7 @@ def refuse_missing(config: dict) -> None:
         "recognition.table": config["recognition"]["table"],
     }
     if file_of(network["backbone"]) is not None:
-        files["recognition.network.backbone"] = network["backbone"].rpartition(":")[0]
+        files["recognition.network.backbone"] = file_and_function(network["backbone"])[0]
     if network["weights"] not in ("none", "hub"):
         files["recognition.network.weights"] = network["weights"]
     for key in ("published", "accuracy"):

@@ -117,7 +117,7 @@ class Run:
         return {scheme.slug: scheme for scheme in self.schemes.values()}
 
     def own_backbone(self, scheme: Scheme) -> str:
-        """FILE.py:FUNCTION of a scheme's backbone, "" for a library's."""
+        """Return FILE.py:FUNCTION of a scheme's backbone, "" for a library's."""
         name = scheme.backbone_of(self.config["recognition"]["network"])
         if ".py:" not in name:
             return ""
@@ -153,8 +153,11 @@ class Run:
                 names.append(f"unseen/{scheme.slug}/{seed}")
         return names
 
-    def is_reduced(self, size: int) -> bool:
-        """Whether the tiles stage reduces its images to this size; signal shards have no tiles."""
+    def is_made_by_tiles_stage(self, size: int) -> bool:
+        """Return whether the tiles stage makes images of this size (pixels per side).
+
+        Only runs with shards of images have a tiles stage.
+        """
         return self.config["shards"]["kind"] == "image" and size in self.config["tiles"]["reduced"]
 
     def images_of_job(self, wildcards: Any) -> int:

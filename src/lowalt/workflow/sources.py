@@ -111,7 +111,8 @@ def sources(*modules: str, spectra: tuple[str, ...] = ()) -> tuple[Path, ...]:
         todo += _imports(file_of(name), package)
         if name == CATALOGUE:
             todo += [module_name(spectrum) for spectrum in spectra]
-        if name == EXTENSIONS:
+        # A core without its folder of extensions declares none.
+        if name == EXTENSIONS and _file(DECLARATION):
             todo.append(DECLARATION)
         if name == MESHES:
             todo += offered("meshes").values()

@@ -9,7 +9,6 @@ import json
 import re
 import runpy
 import shutil
-import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -380,6 +379,7 @@ def test_frozen_features_are_those_of_each_sample_s_images_station_by_station(
     assert (embedded_of(benchmark.load("one-station", "test"), tmp_path) == found[:, 0]).all()
 
 
+@pytest.mark.slow
 def test_the_study_trains_tests_and_writes_its_table(small, tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(ROOT / "studies")
     monkeypatch.syspath_prepend(ROOT / "studies/benchmark")
@@ -437,7 +437,11 @@ def test_the_study_trains_tests_and_writes_its_table(small, tmp_path, monkeypatc
     shutil.rmtree(tmp_path / "out")
 
 
-def test_the_study_says_what_it_takes():
-    words = [sys.executable, str(ROOT / "studies/benchmark/study.py"), "--help"]
-    found = subprocess.run(words, cwd=ROOT, capture_output=True, text=True)
-    assert found.returncode == 0 and "--confirm" in found.stdout
+def test_the_study_says_what_it_takes(monkeypatch, capsys):
+    monkeypatch.syspath_prepend(ROOT / "studies")
+    monkeypatch.syspath_prepend(ROOT / "studies/benchmark")
+    path = str(ROOT / "studies/benchmark/study.py")
+    monkeypatch.setattr(sys, "argv", [path, "--help"])
+    with pytest.raises(SystemExit) as ended:
+        runpy.run_path(path, run_name="__main__")
+    assert ended.value.code == 0 and "--confirm" in capsys.readouterr().out

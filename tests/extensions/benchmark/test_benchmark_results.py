@@ -1,8 +1,10 @@
 """The benchmark's results beside a run: two methods compared, and its section of the report."""
 
 import json
+from pathlib import Path
 from types import SimpleNamespace
 
+import benchmark_picture
 import pytest
 
 from configured import stages_of
@@ -12,6 +14,8 @@ from lowalt.files.csv_tables import read_csv
 from lowalt.report.inputs import FILES, Inputs
 from lowalt.report.page import added_sections, assembled
 from pages import sound
+
+ROOT = Path(__file__).parents[3]
 
 
 def test_compare_holds_two_methods_of_the_benchmark_against_each_other(tmp_path, capsys):
@@ -79,3 +83,10 @@ def test_the_code_and_the_template_of_the_section_are_inputs_of_the_page_that_sh
     assert {f"{folder}/benchmark_results.py", f"{folder}/benchmark_results.html"} <= added
     assert not [path for path in inputs["default"] if "extensions/benchmark" in path]
     assert inputs["default"] < inputs["lowalt-40-v1"]
+
+
+def test_the_picture_of_the_benchmark_is_that_of_the_kept_table():
+    rows = baseline_table.read()
+    for name, narrow in (("benchmark.svg", False), ("benchmark-narrow.svg", True)):
+        kept = (ROOT / "docs/pictures" / name).read_text()
+        assert kept == benchmark_picture.picture(rows, narrow)

@@ -3,6 +3,7 @@
 The page on it leads to a confirmed row.
 """
 
+import csv
 import json
 import os
 import pickle
@@ -57,6 +58,17 @@ def test_the_table_follows_from_the_files_of_the_folder(tmp_path, capsys):
         ("b-mine", "one-station"),
     ]
     assert {row["percent"] for row in rows} == {"75"} and rows[1]["confirmed_percent"] == "88"
+    with (tmp_path / submitted_rows.TABLE).open(newline="") as file:
+        kept = list(csv.DictReader(file))
+    for name in ("submission", "track", "percent", "answers_sha256"):
+        assert [row[name] for row in kept] == [row[name] for row in rows]
+
+
+# The script starts the command twice.
+@pytest.mark.slow
+def test_the_script_of_the_checks_refuses_a_table_that_the_files_do_not_give(tmp_path):
+    submitted(tmp_path, "mine")
+    assert main(["benchmark", "submissions", str(tmp_path)]) == 0
     table = (tmp_path / submitted_rows.TABLE).read_text()
     checked = {**os.environ, "LOWALT": str(Path(sys.executable).with_name("lowalt"))}
     words = [str(ROOT / ".ci/submissions.sh"), str(tmp_path)]

@@ -16,6 +16,7 @@ from lowalt.targets.cloud import read
 from lowalt.targets.make import make
 from lowalt.targets.records import estimates, merge, with_row
 
+pytestmark = pytest.mark.usefixtures("without_target_picture")
 DRONE = [
     "--rotors",
     "6",

@@ -24,6 +24,7 @@ from lowalt.targets.mesh_size import refuse_implausible
 from lowalt.targets.records import load_table
 from meshes import box, saved
 
+pytestmark = pytest.mark.usefixtures("without_target_picture")
 HUBS = np.array([(0.13, 0.11), (0.13, -0.11), (-0.13, 0.11), (-0.13, -0.11)])
 
 

@@ -151,6 +151,7 @@ def test_inspection_leaves_a_picture(tmp_path, monkeypatch, capsys):
     assert picture.size[0] > 1000 and len(picture.convert("RGB").getcolors(1 << 24)) > 20
 
 
+@pytest.mark.usefixtures("without_target_picture")
 def test_a_car_without_wheels_is_asked_for_them_then_made_and_shown_with_a_warning(
     tmp_path, capsys, monkeypatch
 ):

@@ -13,6 +13,7 @@ from lowalt.files.errors import InputError
 from lowalt.targets.cloud import read
 from made_robots import car_urdf
 
+pytestmark = pytest.mark.usefixtures("without_target_picture")
 UP = np.array([0.0, 0.0, 1.0])
 BOX = np.array([(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-0.1, 0.1)])
 FOUR = {"a": (1, 1), "b": (1, -1), "c": (-1, 1), "d": (-1, -1)}

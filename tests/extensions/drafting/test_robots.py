@@ -17,6 +17,8 @@ from lowalt.files.errors import InputError, InputWarning
 from lowalt.targets.cloud import Cloud, read
 from made_robots import HUBS, MJCF, SDF, urdf
 
+pytestmark = pytest.mark.usefixtures("without_target_picture")
+
 
 def folder(tmp_path: Path) -> Path:
     """A folder of inputs with the package `craft` and its propeller."""

@@ -14,6 +14,7 @@ from lowalt.extensions.recordings.presence import (
     floor_between,
     noise_floor,
     present,
+    without_hum,
 )
 from lowalt.extensions.recordings.twin import Twin, radars
 
@@ -57,6 +58,36 @@ def test_coloured_noise_and_a_line_that_stays_are_no_target():
     assert present(stays[5:6], LOOKING, coloured[1:2]).all()
 
 
+def test_a_line_that_stays_is_taken_out_of_windows_and_a_target_is_not():
+    rng = np.random.default_rng(6)
+    time = np.arange(400)
+    noise = rng.standard_normal((40, 400)) + 1j * rng.standard_normal((40, 400))
+
+    def line(cycles: float) -> np.ndarray:
+        """A line of a window by its cycles per symbol, 26 dB above the noise of a cell."""
+        return 1.4 * np.exp(2j * np.pi * cycles * time)
+
+    hum = noise + line(0.25)
+    passes = hum.copy()
+    # 0.025 cycles per symbol are 0.47 m/s, next to what is taken out of windows as too slow.
+    for cycles in (0.025, 0.5):
+        passes[7:9] += line(cycles)
+    cleaned = without_hum(passes, LOOKING)
+
+    def power(intervals: np.ndarray, cycles: float) -> np.ndarray:
+        """Power of each window at a speed, over that of the noise."""
+        return np.abs(np.fft.fft(intervals, axis=1)[:, round(400 * cycles)]) ** 2 / 800
+
+    assert np.median(power(passes, 0.25)) > 300 and np.median(power(cleaned, 0.25)) < 3
+    for cycles in (0.025, 0.5):
+        np.testing.assert_allclose(
+            power(cleaned, cycles)[7:9], power(passes, cycles)[7:9], rtol=0.1
+        )
+    few = passes[: ENOUGH - 1]
+    assert without_hum(few, LOOKING) is few
+    assert without_hum(passes, replace(LOOKING, slowest_mps=0.0)) is passes
+
+
 def test_a_drift_slower_than_any_target_is_none():
     rng = np.random.default_rng(0)
     intervals = rng.standard_normal((40, 400)) + 1j * rng.standard_normal((40, 400))
@@ -67,9 +98,37 @@ def test_a_drift_slower_than_any_target_is_none():
     )
 
 
+def test_a_weaker_line_counts_where_it_continues_one_that_counts():
+    rng = np.random.default_rng(4)
+    time = np.arange(400)
+    twin = replace(LOOKING, detect_db=20.0)
+    noise = rng.standard_normal((40, 400)) + 1j * rng.standard_normal((40, 400))
+
+    def line(amplitude: float, cycles: float) -> np.ndarray:
+        """A line of a window by its amplitude and its cycles per symbol."""
+        return amplitude * np.exp(2j * np.pi * cycles * time)
+
+    strong = 1.6
+    weak = 0.6
+    alone = noise.copy()
+    alone[20:24] += line(weak, 0.4)
+    assert not present(alone, twin).any()
+    # 3 m/s^2 change a speed by 0.4 m/s from a window to the next: 0.02 cycles per symbol.
+    track = noise.copy()
+    for number, (amplitude, cycles) in enumerate(
+        [(weak, 0.36), (weak, 0.38), (strong, 0.4), (weak, 0.41), (weak, 0.43)]
+    ):
+        track[20 + number] += line(amplitude, cycles)
+    assert present(track, twin).nonzero()[0].tolist() == [20, 21, 22, 23, 24]
+    elsewhere = noise.copy()
+    elsewhere[22] += line(strong, 0.4)
+    elsewhere[23] += line(weak, 0.6)
+    assert present(elsewhere, twin).nonzero()[0].tolist() == [22]
+
+
 def test_the_floor_between_lines_is_the_mean_of_the_noise_for_a_window_as_for_many():
     rng = np.random.default_rng(1)
-    for count in (1, 30):
+    for count in (1, 6):
         power = rng.exponential(2.0, (count, 4000))
         # Lines in two fifths of the band, as a rotor's, leave the noise between them.
         lined = np.where(np.arange(4000) % 10 < 4, 1000.0, power)

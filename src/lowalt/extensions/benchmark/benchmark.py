@@ -7,7 +7,7 @@ from pathlib import Path
 from lowalt.commands import workflow
 from lowalt.commands.command_line import Answer, add_command
 from lowalt.commands.command_table import COMMANDS
-from lowalt.config.command import name_backbone
+from lowalt.config.command import add_backbone_option
 from lowalt.extensions.benchmark import baseline_table, frozen_bytes, submitted_rows
 from lowalt.extensions.benchmark.baselines import kept
 from lowalt.extensions.benchmark.benchmark_tracks import TRACKS, Track, named
@@ -71,7 +71,7 @@ def add_to(commands: argparse._SubParsersAction, name: str) -> None:
     about = "instead of a model: a Python file that answers; it runs with your rights"
     line.add_argument("--predict", type=Path, metavar="FILE.py", help=about)
     line.add_argument("--track", required=True, help="the track, such as unseen")
-    name_backbone(line)
+    add_backbone_option(line)
     line = add_command(
         own,
         "submissions",

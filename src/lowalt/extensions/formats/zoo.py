@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from lowalt.config.command import name_backbone, run
+from lowalt.config.command import add_backbone_option, run
 from lowalt.extensions.formats.zoo_files import ZOO
 from lowalt.files.atomic import slug
 from lowalt.files.errors import InputError
@@ -133,7 +133,7 @@ def main(arguments: list[str]) -> None:
     )
     line.add_argument("--name", required=True, help="name of the entry, such as default-seen")
     line.add_argument("--out", type=Path, default=ZOO, help=f"folder of the zoo (default: {ZOO})")
-    name_backbone(line)
+    add_backbone_option(line)
     options = line.parse_args(arguments)
     from lowalt.recognition.sample_sources import Source
 

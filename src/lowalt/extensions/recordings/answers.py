@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from lowalt.extensions.recordings.files import read
-from lowalt.extensions.recordings.presence import beyond_mps, present
+from lowalt.extensions.recordings.presence import beyond_mps, present, without_hum
 from lowalt.extensions.recordings.record import Record
 from lowalt.extensions.recordings.twin import Twin, radars
 from lowalt.extensions.recordings.window_samples import Windows, facts, rendered
@@ -20,7 +20,10 @@ ANOTHER = 0.02
 network's.
 """
 
-
+FOLLOWED_S = 1.2
+"""How long before and after a window the target is taken to be the same one (s)."""
+LEAST_SHARE = 1e-3
+"""Least probability of a class in a window, so that no single window outweighs those around it."""
 UNNAMED = ("nothing", "beyond", "clipped", "lost")
 """Outcomes of windows that no network names."""
 
@@ -31,8 +34,8 @@ class Answers(NamedTuple):
     `fastest_mps`, NaN for none, and whether samples of it are lost (n,) bool; `notes` say for which
     reasons an answer may be wrong.
 
-    A window that is clipped, lost or has such a line counts as one without a target: the network
-    cannot know it.
+    The probabilities of a window with a target are those of its track (`followed`). A window that
+    is clipped, lost or has such a line counts as one without a target: the network cannot know it.
     """
 
     starts_s: np.ndarray
@@ -61,8 +64,10 @@ class Answers(NamedTuple):
             "nothing": "nothing there",
             "clipped": "clipped by the receiver",
             "lost": "samples are lost: exact zeros",
-            "beyond": f"a line at {self.beyond_mps[number]:.3g} m/s, beyond the {self.fastest_mps:.3g} m/s of this "
-            "network",
+            "beyond": (
+                f"a line at {self.beyond_mps[number]:.3g} m/s, beyond the {self.fastest_mps:.3g}"
+                " m/s of this network"
+            ),
         }
         return said.get(outcome) or f"{100 * self.probabilities[number].max():6.2f} %  {outcome}"
 
@@ -77,25 +82,32 @@ def answers(trained: Trained, settings: dict, record: Record, where: str) -> Ans
     known = radars()
     if "radar" not in settings:
         raise InputError(
-            f"{trained.path}: knows no recordings, expected a network of a radar such as {sorted(known)}"
+            f"{trained.path}: knows no recordings, expected a network of a radar such as"
+            f" {sorted(known)}"
         )
     radar = Twin.from_settings(settings["radar"])
     if not radar.near(record.carrier_hz):
         near = [name for name, other in known.items() if other.near(record.carrier_hz)]
         raise InputError(
-            f"{where}: carrier_hz is {record.carrier_hz:.3g}, and {trained.path.stem} knows {radar.carrier_hz:.3g}, "
+            f"{where}: carrier_hz is {record.carrier_hz:.3g}, and {trained.path.stem} knows"
+            f" {radar.carrier_hz:.3g}, "
             + (
                 f"expected a network of {near}"
                 if near
-                else "expected a network of your own radar, which "
-                "`lowalt recording train` makes; the zoo has none"
+                else (
+                    "expected a network of your own radar, which "
+                    "`lowalt recording train` makes; the zoo has none"
+                )
             )
         )
     twin = radar.at_carrier(record.carrier_hz)
     baseband = read(record)
     found = looks(record, twin, baseband)
     intervals = found.intervals.astype(np.complex64)
-    images = rendered(intervals, twin, Images.from_settings(settings["images"]), trained.size)
+    there = ~(found.clipped | found.lost)
+    shown = intervals.copy()
+    shown[there] = without_hum(intervals[there], twin)
+    images = rendered(shown, twin, Images.from_settings(settings["images"]), trained.size)
     count = len(intervals)
     numbers = np.arange(len(intervals))
     samples = Windows(
@@ -105,7 +117,6 @@ def answers(trained: Trained, settings: dict, record: Record, where: str) -> Ans
     values = baseband.values if twin.channel == "complex" else baseband.values.real
     beyond = beyond_mps(values, baseband.rate_hz, twin, count)
     starts = numbers * twin.symbols * twin.symbol_interval_s
-    there = ~(found.clipped | found.lost)
     empty = (
         intervals[_empty(record, starts, twin, where, there)]
         if record.empty_s and not twin.slowest_mps
@@ -113,10 +124,27 @@ def answers(trained: Trained, settings: dict, record: Record, where: str) -> Ans
     )
     there[there] = present(intervals[there], twin, empty)
     there &= ~np.isfinite(beyond)
+    shares[there] = followed(shares[there], starts[there])
     notes = _notes(record, radar, settings.get("caution", ""), there.any())
     return Answers(
         starts, there, shares, found.clipped, beyond, found.lost, twin.fastest_mps, notes
     )
+
+
+def followed(shares: np.ndarray, starts_s: np.ndarray) -> np.ndarray:
+    """Return class probabilities (n, classes) of windows with a target as those of its track: the
+    geometric mean over the windows within `FOLLOWED_S`, of which no class is below `LEAST_SHARE`.
+
+    starts_s: (n,) s, rising. What drives past or walks is the same thing a second later, although a
+    window may show it abeam, or on its turn.
+    """
+    within_s = FOLLOWED_S * (1 + 1e-9)
+    first = np.searchsorted(starts_s, starts_s - within_s)
+    after = np.searchsorted(starts_s, starts_s + within_s)
+    logarithms = np.log(np.maximum(shares, LEAST_SHARE))
+    sums = np.concatenate([np.zeros((1, shares.shape[1])), logarithms.cumsum(axis=0)])
+    together = np.exp((sums[after] - sums[first]) / (after - first)[:, None])
+    return together / together.sum(axis=1, keepdims=True)
 
 
 def _empty(
@@ -144,8 +172,8 @@ def _notes(record: Record, radar: Twin, caution: str, found: bool) -> list[str]:
         at = radar.carrier_hz / 1e9
         here = record.carrier_hz / 1e9
         notes.append(
-            f"this network learned a radar at {at:.4g} GHz, and the recording is at {here:.4g} GHz: expect "
-            "wrong classes; `lowalt recording train` makes a network for its radar"
+            f"this network learned a radar at {at:.4g} GHz, and the recording is at {here:.4g} GHz:"
+            " expect wrong classes; `lowalt recording train` makes a network for its radar"
         )
     if found and not radar.slowest_mps and record.empty_s is None:
         notes.append(

@@ -105,8 +105,8 @@ def symbol_rate(
     step = rate_hz * symbol_interval_s
     if step < 1 - 1e-9:
         raise InputError(
-            f"recording at {rate_hz:.6g} samples/s has less than one per symbol of {symbol_interval_s:.4g} s, "
-            f"expected at least {1 / symbol_interval_s:.6g} samples/s"
+            f"recording at {rate_hz:.6g} samples/s has less than one per symbol of"
+            f" {symbol_interval_s:.4g} s, expected at least {1 / symbol_interval_s:.6g} samples/s"
         )
     signal = analytic(values)
     if sampling == "one_sided":

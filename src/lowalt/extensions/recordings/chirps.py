@@ -44,8 +44,8 @@ def chirp_rows(rows: np.ndarray, samples: int, where: str) -> tuple[np.ndarray, 
     if values.shape[1] == 2 * samples:
         return (values[:, :samples] + 1j * values[:, samples:]).reshape(-1), times
     raise InputError(
-        f"{where}: rows of {rows.shape[1]} columns, expected the {samples} samples of a chirp, or twice "
-        "as many for in-phase and quadrature, and perhaps its time"
+        f"{where}: rows of {rows.shape[1]} columns, expected the {samples} samples of a chirp, or"
+        " twice as many for in-phase and quadrature, and perhaps its time"
     )
 
 

@@ -61,8 +61,8 @@ def agreed_rate(
         if abs(steps - middle).max() > 0.5 * middle:
             place = int(abs(steps - middle).argmax())
             raise InputError(
-                f"{path}: the sample times jump by {steps[place]:.4g} s at sample {place + 1}, expected "
-                f"{middle:.4g} s everywhere"
+                f"{path}: the sample times jump by {steps[place]:.4g} s at sample {place + 1},"
+                f" expected {middle:.4g} s everywhere"
             )
         rates["times"] = float(1 / middle)
     known = {name: rate for name, rate in rates.items() if rate is not None}
@@ -178,8 +178,8 @@ def check(path: Path, values: np.ndarray, moves: str | None = None) -> None:
             )
     if not np.iscomplexobj(values) and _mirrored(values) > MIRRORED:
         raise InputError(
-            f"{path}: the spectrum is mirrored about a quarter of the rate, as where I and Q stand in "
-            "turn; expected channel 'complex' with layout 'iqiq', or one real channel"
+            f"{path}: the spectrum is mirrored about a quarter of the rate, as where I and Q stand"
+            " in turn; expected channel 'complex' with layout 'iqiq', or one real channel"
         )
     if np.iscomplexobj(values):
         shifted = values - values.mean()
@@ -209,10 +209,9 @@ def refuse_alike(path: Path, values: np.ndarray) -> None:
     alike = np.sum((first * second.conj()).real) ** 2 / max(powers, 1e-300)
     if alike > NEARLY_SAME:
         raise InputError(
-            f"{path}: two columns that nearly repeat each other (squared correlation {alike:.3f}), as "
-            "in-phase and quadrature of a moving target do not, expected channel 'real' with one "
-            "of the "
-            "`columns`, or trust 'record'"
+            f"{path}: two columns that nearly repeat each other (squared correlation {alike:.3f}),"
+            " as in-phase and quadrature of a moving target do not, expected channel 'real' with"
+            " one of the `columns`, or trust 'record'"
         )
 
 
@@ -227,7 +226,7 @@ def refuse_swapped(path: Path, values: np.ndarray, moves: str | None) -> None:
         right, wrong = (towards, away) if moves == "towards" else (away, towards)
         if wrong > SIDE_RATIO * right:
             raise InputError(
-                f"{path}: channels swapped, the record says the target moves {moves}, but the other "
-                f"side of the Doppler axis holds {wrong / max(right, 1e-300):.3g} times the energy; "
-                "expected the two columns in the order I, Q"
+                f"{path}: channels swapped, the record says the target moves {moves}, but the other"
+                f" side of the Doppler axis holds {wrong / max(right, 1e-300):.3g} times the"
+                " energy; expected the two columns in the order I, Q"
             )

@@ -369,8 +369,8 @@ def _inspected(path: Path, carrier_hz: float | None, rate_hz: float | None) -> F
         kind = f"read as {powers.keys['dtype']} " if "dtype" in powers.keys else ""
         notes.insert(
             0,
-            f"{kind}no number is negative and most are far below their mean, as powers or magnitudes of "
-            "spectra are: a recording needs the samples themselves",
+            f"{kind}no number is negative and most are far below their mean, as powers or"
+            " magnitudes of spectra are: a recording needs the samples themselves",
         )
     return FileInspection(path, carrier_hz, rate_hz, said, found[:SHOWN], notes)
 
@@ -412,13 +412,14 @@ def _notes(path: Path, seen: Seen, rate_hz: float | None, carrier_hz: float | No
     gone = faults.lost(values).mean()
     if gone:
         notes.append(
-            f"{100 * gone:.2g} % of the samples are lost: exact zeros in a row; their windows are left out"
+            f"{100 * gone:.2g} % of the samples are lost: exact zeros in a row; their windows are"
+            " left out"
         )
     constant = _decibels(abs(mean) ** 2 / spread**2)
     if constant > DC_DB:
         notes.append(
-            f"a constant part stands {constant:.0f} dB above the rest: the transmitter's leak, or unsigned "
-            "numbers; each window loses its mean anyway"
+            f"a constant part stands {constant:.0f} dB above the rest: the transmitter's leak, or"
+            " unsigned numbers; each window loses its mean anyway"
         )
     power = np.abs(np.fft.fft((values - mean) * np.hanning(len(values)))) ** 2
     if rate_hz:
@@ -428,8 +429,8 @@ def _notes(path: Path, seen: Seen, rate_hz: float | None, carrier_hz: float | No
         if _decibels(image) > IMAGE_DB and coherence > COHERENT:
             below = max(0.0, -_decibels(image))
             notes.append(
-                f"the strongest line has an image at the opposite Doppler, {below:.0f} dB below: a target "
-                "with equal sides, such as a rotor, or I and Q of unequal strength"
+                f"the strongest line has an image at the opposite Doppler, {below:.0f} dB below: a"
+                " target with equal sides, such as a rotor, or I and Q of unequal strength"
             )
         elif "chirps" not in seen.keys and (
             len(seen.keys.get("columns", ())) == 2 or seen.keys.get("layout")

@@ -102,8 +102,8 @@ def _chosen(table: Table, record: Record) -> tuple[tuple[int | str, ...], str | 
     )
     if wrong:
         raise InputError(
-            f"{path}: the columns {list(columns)} are {' and '.join(said)} by their names, expected in-phase and "
-            "quadrature, magnitude and phase (layout 'polar'), or trust 'record'"
+            f"{path}: the columns {list(columns)} are {' and '.join(said)} by their names, expected"
+            " in-phase and quadrature, magnitude and phase (layout 'polar'), or trust 'record'"
         )
     return columns, layout
 
@@ -134,16 +134,16 @@ def channel_of(table: Table, record: Record) -> np.ndarray:
         parts = parted(parts[0], layout, str(path))
         if record.receiver >= len(parts):
             raise InputError(
-                f"{path}: receiver is {record.receiver}, expected less than {len(parts)} for layout "
-                f"{layout!r}"
+                f"{path}: receiver is {record.receiver}, expected less than {len(parts)} for layout"
+                f" {layout!r}"
             )
         parts = [parts[record.receiver]] if record.chirps is None or layout == "dca4" else parts
     complex_already = len(parts) == 1 and np.iscomplexobj(parts[0])
     if record.channel == "real" or (record.chirps and len(parts) == 1 and not complex_already):
         if len(parts) != 1 or complex_already:
             raise InputError(
-                f"{path}: {len(parts)} columns of {parts[0].dtype}, expected one real column for channel "
-                "'real'; name it as `columns`"
+                f"{path}: {len(parts)} columns of {parts[0].dtype}, expected one real column for"
+                " channel 'real'; name it as `columns`"
             )
         return parts[0].astype(np.float64)
     if complex_already:
@@ -183,8 +183,8 @@ def _refuse_misread(table: Table, record: Record) -> None:
     better = contradiction(found, dtype if raw else "", layout or "")
     if better:
         raise InputError(
-            f"{path}: the samples do not follow on one another as the record has them, but do with {better}; expected "
-            "that, or trust 'record' (`lowalt recording inspect` shows both)"
+            f"{path}: the samples do not follow on one another as the record has them, but do with"
+            f" {better}; expected that, or trust 'record' (`lowalt recording inspect` shows both)"
         )
 
 
@@ -239,8 +239,8 @@ def read(record: Record) -> Baseband:
     whole = len(values) // (samples * receivers) * samples * receivers
     if not whole or (record.receiver >= receivers and record.layout != "dca4"):
         raise InputError(
-            f"{path}: {len(values)} samples and receiver {record.receiver}, expected chirps of {samples} "
-            f"samples of {receivers} receivers"
+            f"{path}: {len(values)} samples and receiver {record.receiver}, expected chirps of"
+            f" {samples} samples of {receivers} receivers"
         )
     values = slow_time(
         values[:whole], samples, receivers, 0 if record.layout == "dca4" else record.receiver

@@ -24,7 +24,7 @@ from lowalt.extensions.recordings.mat_files import read_mat
 from lowalt.extensions.recordings.record import Record
 from lowalt.files.array_files import array_of
 from lowalt.files.atomic import bytes_of, text_file
-from lowalt.files.errors import InputError, lacking
+from lowalt.files.errors import InputError, missing_package
 from lowalt.files.inside import inside
 from lowalt.files.json_objects import read_object
 
@@ -120,7 +120,8 @@ def _mat(path: Path, record: Record) -> Table:
         arrays = [key for key, value in variables.items() if value.size > 1]
         if len(arrays) != 1:
             raise InputError(
-                f"{path}: variables {sorted(variables)}, expected the record to name one as `variable`"
+                f"{path}: variables {sorted(variables)}, expected the record to name one as"
+                " `variable`"
             )
         name = arrays[0]
     if name not in variables:
@@ -248,8 +249,8 @@ def _captured(
         gap = next_time - time - (later - start) / (rate_hz or record.rate_hz or math.nan)
         if record.capture is None and abs(gap) > GAP_S:
             raise InputError(
-                f"{path}: the capture at sample {later} begins {gap:.6g} s after the samples before it "
-                f"end, expected the number of one, 0 to {len(captures) - 1}, as `capture`"
+                f"{path}: the capture at sample {later} begins {gap:.6g} s after the samples before"
+                f" it end, expected the number of one, 0 to {len(captures) - 1}, as `capture`"
             )
     last = (
         count
@@ -303,8 +304,8 @@ def _samples_alone(path: Path, signal: Any) -> Any:
         start = skipped + frame_bytes * int(capture.get("core:sample_start", 0))
         if not begin <= start <= start + header < end:
             raise InputError(
-                f"{path}: {len(data)} bytes, of which {end} are not trailing; a capture would begin "
-                f"at byte {start + header}, expected its samples inside the file and in order"
+                f"{path}: {len(data)} bytes, of which {end} are not trailing; a capture would begin"
+                f" at byte {start + header}, expected its samples inside the file and in order"
             )
         kept.append(data[begin:start])
         begin = start + header
@@ -327,7 +328,7 @@ def _sigmf(path: Path, record: Record) -> Table:
     try:
         import sigmf
     except ImportError as error:
-        raise lacking(error) from error
+        raise missing_package(error) from error
 
     metadata = read_object(path.with_suffix(".sigmf-meta"), "metadata of a SigMF recording")
     fields = metadata.get("global")

@@ -169,8 +169,8 @@ def _baseband(record: Record) -> Baseband:
         return read(record)
     if "snr_db" not in (record.twin or {}):
         raise InputError(
-            f"{record.file}: no recording to measure the noise in, expected `file`, or twin.snr_db, the "
-            "least and largest SNR in dB"
+            f"{record.file}: no recording to measure the noise in, expected `file`, or twin.snr_db,"
+            " the least and largest SNR in dB"
         )
     return Baseband(np.empty(0), float(record.rate_hz or 0))
 

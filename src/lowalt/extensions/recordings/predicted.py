@@ -50,6 +50,9 @@ def answer(model: "Trained", settings: dict, record: Record, name: str) -> tuple
     counts = [f"{category} {outcomes.count(category)}" for category in model.classes]
     last = f"{heard.present.sum()} of {len(names)} windows hold a target: {', '.join(counts)}"
     if not heard.present.any():
-        last = f"nothing there: none of {len(names)} windows holds a target that this network could know"
+        last = (
+            f"nothing there: none of {len(names)} windows holds a target that this network could"
+            " know"
+        )
     notes = [f"note: {note}" for note in heard.notes]
     return windows, "\n".join([*lines, last, *notes])

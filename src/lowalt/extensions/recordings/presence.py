@@ -18,6 +18,16 @@ QUIET_SHARE = 0.1
 """Share of the windows in which a speed is taken to be empty."""
 FLOOR_MPS = 0.5
 """Speeds to either side over which the noise floor is smooth."""
+CONTINUES_DB = 12.0
+"""Level over the noise floor of a line that continues one of the window before or after, where
+`detect_db` is higher.
+"""
+CONTINUES_MPS2 = 3.0
+"""Change of a line's speed from a window to the next, over their distance: cars speed up and brake
+by as much.
+"""
+STAYS_DB = 6.0
+"""Level over its surroundings from which a line that stays is taken out of windows."""
 ENOUGH = 20
 """Least number of windows with which a constant line can be told from a target."""
 BETWEEN_SHARE = 0.25
@@ -57,6 +67,14 @@ def speeds_shown(speeds: np.ndarray, edge_mps: float, sides: str) -> tuple[np.nd
     return np.arange(len(speeds)), speeds
 
 
+def _quiet(power: np.ndarray) -> np.ndarray:
+    """Mean (speeds,) of exponential powers, from the weakest tenth of the powers (n, speeds)."""
+    count = len(power)
+    least = math.ceil(QUIET_SHARE * count)
+    of_noise = sum(1 / (count - k) for k in range(least))
+    return np.partition(power, least - 1, axis=0)[least - 1] / of_noise
+
+
 def noise_floor(power: np.ndarray, step_mps: float) -> np.ndarray:
     """Return the mean power of the noise (speeds,) in windows (n, speeds), `step_mps` (m/s) apart.
 
@@ -67,15 +85,35 @@ def noise_floor(power: np.ndarray, step_mps: float) -> np.ndarray:
     that never moves is interference.
     Source: minimum statistics, Martin 2001, IEEE Trans. Speech Audio Processing 9(5).
     """
-    count = len(power)
-    least = math.ceil(QUIET_SHARE * count)
-    quiet = np.partition(power, least - 1, axis=0)[least - 1] / sum(
-        1 / (count - k) for k in range(least)
-    )
+    quiet = _quiet(power)
     smooth = median_filter(quiet, 2 * round(FLOOR_MPS / step_mps) + 1, mode="nearest")
     return (
-        smooth if count < ENOUGH else np.maximum(smooth, maximum_filter(quiet, 3, mode="nearest"))
+        smooth
+        if len(power) < ENOUGH
+        else np.maximum(smooth, maximum_filter(quiet, 3, mode="nearest"))
     )
+
+
+def without_hum(intervals: np.ndarray, twin: Twin) -> np.ndarray:
+    """Return intervals (n, symbols) of one recording with the lines that stay in nine tenths of
+    them or more brought down to what is around them; as they are where targets may hover, or where
+    there are fewer than `ENOUGH`.
+
+    What a receiver hums draws lines beside a weak target, and a network takes them for limbs.
+    """
+    count = intervals.shape[1]
+    if not twin.slowest_mps or len(intervals) < ENOUGH:
+        return intervals
+    cells, speeds = _shown(count, twin)
+    places = cells[_may_have(speeds, twin)]
+    spectra = np.fft.fft(intervals, axis=1)
+    quiet = _quiet(np.abs(spectra[:, places]) ** 2)
+    step_mps = 2 * twin.edge_mps / count
+    around = median_filter(quiet, 2 * round(FLOOR_MPS / step_mps) + 1, mode="nearest")
+    over = maximum_filter(quiet, 3, mode="nearest") / np.maximum(around, 1e-300)
+    stays = over > 10 ** (STAYS_DB / 10)
+    spectra[:, places[stays]] /= np.sqrt(over[stays])
+    return np.fft.ifft(spectra, axis=1)
 
 
 def floor_between(power: np.ndarray) -> np.ndarray:
@@ -97,16 +135,26 @@ def floor_between(power: np.ndarray) -> np.ndarray:
     return np.array(least) / -math.log(1 - BETWEEN_SHARE)
 
 
+def _shown(count: int, twin: Twin) -> tuple[np.ndarray, np.ndarray]:
+    """Cells (n,) of a Fourier transform of `count` symbols that the twin shows, and the speeds that
+    they mean (m/s), in order of display."""
+    speeds = np.fft.fftshift(np.fft.fftfreq(count)) * 2 * twin.edge_mps
+    order, meant = speeds_shown(speeds, twin.edge_mps, twin.sides)
+    return np.fft.fftshift(np.arange(count))[order], np.abs(meant)
+
+
+def _may_have(speeds: np.ndarray, twin: Twin) -> np.ndarray:
+    """Which speeds (n,) m/s a target of the twin may have."""
+    return (speeds >= twin.slowest_mps) & (speeds <= twin.fastest_mps)
+
+
 def heard_powers(intervals: np.ndarray, twin: Twin) -> tuple[np.ndarray, np.ndarray]:
     """Return the powers (n, speeds) of intervals (n, symbols) at the speeds that the twin hears,
     and which of these (speeds,) a target may have; Hann window."""
     count = intervals.shape[1]
+    cells, speeds = _shown(count, twin)
     power = np.abs(np.fft.fft(intervals * np.hanning(count), axis=1)) ** 2
-    speeds = np.fft.fftshift(np.fft.fftfreq(count)) * 2 * twin.edge_mps
-    order, meant = speeds_shown(speeds, twin.edge_mps, twin.sides)
-    return np.fft.fftshift(power, axes=1)[:, order], (np.abs(meant) >= twin.slowest_mps) & (
-        np.abs(meant) <= twin.fastest_mps
-    )
+    return power[:, cells], _may_have(speeds, twin)
 
 
 def strongest_mps(intervals: np.ndarray, twin: Twin) -> np.ndarray:
@@ -114,8 +162,7 @@ def strongest_mps(intervals: np.ndarray, twin: Twin) -> np.ndarray:
     have.
     """
     power, heard = heard_powers(intervals, twin)
-    cells = np.fft.fftshift(np.fft.fftfreq(intervals.shape[1]))
-    speeds = np.abs(speeds_shown(cells * 2 * twin.edge_mps, twin.edge_mps, twin.sides)[1])
+    speeds = _shown(intervals.shape[1], twin)[1]
     return speeds[heard][power[:, heard].argmax(axis=1)]
 
 
@@ -124,8 +171,9 @@ def present(intervals: np.ndarray, twin: Twin, noise: np.ndarray | None = None) 
     window, that stands `detect_db` above the recording's own noise floor.
 
     Where targets move (slowest_mps above 0) it is the floor at the line's own speed, in the other
-    windows, and the line is at or above slowest_mps. Where they may hover it is the floor between
-    lines. A recording of `ENOUGH` windows through which a target passes is also judged by its quiet
+    windows, and the line is at or above slowest_mps; a line of `CONTINUES_DB` is enough that
+    continues one of a window next to it. Where they may hover it is the floor between lines. A
+    recording of `ENOUGH` windows through which a target passes is also judged by its quiet
     time, so that hum next to it is no target.
     noise: intervals (m, symbols) of the receiver's noise alone, hum included, where they are known:
     a line must stand above their mean at its own speed, too.
@@ -140,7 +188,11 @@ def present(intervals: np.ndarray, twin: Twin, noise: np.ndarray | None = None) 
         return (power[:, heard] / np.maximum(floor[heard], 1e-300)).max(axis=1)
 
     if twin.slowest_mps:
-        return over(noise_floor(quiet, step_mps)) >= level
+        floor = np.maximum(noise_floor(quiet, step_mps)[heard], 1e-300)
+        window_s = twin.symbols * twin.symbol_interval_s
+        weaker = min(level, 10 ** (CONTINUES_DB / 10))
+        reach = round(CONTINUES_MPS2 * window_s / step_mps)
+        return _continued(power[:, heard] / floor, level, weaker, reach)
     if noise is not None:
         return (
             over(
@@ -153,6 +205,24 @@ def present(intervals: np.ndarray, twin: Twin, noise: np.ndarray | None = None) 
         passing = over(noise_floor(quiet, step_mps))
         if passing.max() >= PASSES * level and np.median(passing) < level:
             found &= passing >= level
+    return found
+
+
+def _continued(over: np.ndarray, level: float, weaker: float, reach: int) -> np.ndarray:
+    """Which windows (n,) bool of the ratios `over` (n, speeds) hold a line of at least `level`, or
+    one of at least `weaker` that continues, within `reach` cells, a line of a window next to it
+    that is found.
+
+    Source: the two thresholds of Canny 1986, IEEE Trans. Pattern Anal. Mach. Intell. 8(6).
+    """
+    found = over.max(axis=1) >= level
+    lines = over >= weaker
+    near = maximum_filter1d(lines.astype(np.uint8), 2 * reach + 1, axis=1, mode="constant") > 0
+    continues = np.any(lines[1:] & near[:-1], axis=1)
+    for later in range(1, len(found)):
+        found[later] |= found[later - 1] and continues[later - 1]
+    for earlier in range(len(found) - 2, -1, -1):
+        found[earlier] |= found[earlier + 1] and continues[earlier]
     return found
 
 

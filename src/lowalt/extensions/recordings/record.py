@@ -60,8 +60,8 @@ def record(block: dict, folder: Path, where: str) -> Record:
     check_brought("recording", block, where)
     if "file" not in block and not {"twin", "rate_hz"} <= set(block):
         raise InputError(
-            f"{where}: missing key(s) ['file'], expected it, or twin and rate_hz of a radar without any "
-            "recording"
+            f"{where}: missing key(s) ['file'], expected it, or twin and rate_hz of a radar without"
+            " any recording"
         )
     columns = tuple(block.get("columns", ()))
     if block["channel"] == "real":

@@ -59,8 +59,10 @@ def add_to(commands: argparse._SubParsersAction, name: str) -> None:
     inspect.add_argument(
         "--out",
         type=Path,
-        help="record to write, in the recording's folder or above (default: the file's name and "
-        ".yaml, here, or beside a recording that lies elsewhere)",
+        help=(
+            "record to write, in the recording's folder or above (default: the file's name and "
+            ".yaml, here, or beside a recording that lies elsewhere)"
+        ),
     )
     meaning = (
         "simulate the radar of a record, train a network for it, and say which accuracy to expect"
@@ -132,8 +134,8 @@ def drafted(inspection: FileInspection, seen: Seen, folder: Path) -> str:
     recording = inspection.path.resolve()
     if not recording.is_relative_to(folder.resolve()):
         raise InputError(
-            f"--out: the folder {folder} is not that of {inspection.path}, expected a record in the "
-            "recording's folder or above"
+            f"--out: the folder {folder} is not that of {inspection.path}, expected a record in the"
+            " recording's folder or above"
         )
     path = recording.relative_to(folder.resolve()).as_posix()
     lines = [
@@ -262,10 +264,15 @@ def _train(options: argparse.Namespace) -> Answer:
     if not record.recorded:
         then = f"lowalt recording inspect FILE --carrier {record.carrier_hz:g}"
     lines = [
-        f"{facts['file']}: {facts['percent']:.1f} % of {facts['windows']} simulated windows right ({each}), which no "
-        f"training saw; its mean probability is {facts['mean_probability_percent']:.1f} %",
-        "Real recordings differ from their simulation: design/measured.md says by how much for "
-        "three radars.",
+        (
+            f"{facts['file']}: {facts['percent']:.1f} % of {facts['windows']} simulated windows"
+            f" right ({each}), which no training saw; its mean probability is"
+            f" {facts['mean_probability_percent']:.1f} %"
+        ),
+        (
+            "Real recordings differ from their simulation: design/measured.md says by how much for "
+            "three radars."
+        ),
         f"next     {then}",
     ]
     return Answer(facts, "\n".join(lines))

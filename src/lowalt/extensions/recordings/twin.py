@@ -58,8 +58,8 @@ class Twin:
         twin = cls(*pick(block, *cls.__dataclass_fields__))
         if twin.channel not in CHANNELS or twin.sampling not in SAMPLINGS:
             raise InputError(
-                f"twin: channel {twin.channel!r}, sampling {twin.sampling!r}, expected one of {CHANNELS} "
-                f"and of {SAMPLINGS}"
+                f"twin: channel {twin.channel!r}, sampling {twin.sampling!r}, expected one of"
+                f" {CHANNELS} and of {SAMPLINGS}"
             )
         twin.network(2)
         return twin
@@ -173,8 +173,8 @@ def twin_of(record: Record, rate_hz: float) -> Twin:
     missing = [key for key in (ASKED if usual_scenes else ASKED[:1]) if key not in said]
     if missing:
         raise InputError(
-            f"{record.file}: the record says nothing of {', '.join(missing)}, expected a block twin "
-            "such as {waveform: cw, distance_m: [2, 10], height_m: [-1, 2], beam_deg: 60}"
+            f"{record.file}: the record says nothing of {', '.join(missing)}, expected a block twin"
+            " such as {waveform: cw, distance_m: [2, 10], height_m: [-1, 2], beam_deg: 60}"
         )
     one_sided = record.channel == "real" and said.get("sampling", "one_sided") == "one_sided"
     # Unambiguous are lambda / 4 T of a complex channel, twice that of a one-sided one.
@@ -198,8 +198,9 @@ def twin_of(record: Record, rate_hz: float) -> Twin:
     )
     if not 1 - 1e-9 <= simulated_hz * interval_s <= MOST_SAMPLES / symbols:
         raise InputError(
-            f"{record.file}: {symbols} values of {interval_s:.4g} s, simulated at {simulated_hz:.6g} Hz, "
-            f"expected at least one sample per value, at most {MOST_SAMPLES} per window"
+            f"{record.file}: {symbols} values of {interval_s:.4g} s, simulated at"
+            f" {simulated_hz:.6g} Hz, expected at least one sample per value, at most"
+            f" {MOST_SAMPLES} per window"
         )
     slowest_mps = said.get("slowest_mps", SLOWEST_MPS)
     detect_db = said.get("detect_db", DETECT_DB)

@@ -122,7 +122,8 @@ def to_and_fro(
     # While turning, speed is v cos(pi u) over u in 0..1: half a turn covers v turn_s / pi each way.
     if speed_mps <= 0:
         raise InputError(
-            f"walk at {speed_mps} m/s, expected more than 0: a target that stays has the course hover"
+            f"walk at {speed_mps} m/s, expected more than 0: a target that stays has the course"
+            " hover"
         )
     leg = far_m - near_m - 2 * speed_mps * turn_s / np.pi
     if leg <= 0:

@@ -9,6 +9,7 @@ its gain control, the converter.
 """
 
 from dataclasses import MISSING, dataclass, fields
+from functools import lru_cache
 
 import numpy as np
 from scipy.signal import butter, lfilter, sosfilt
@@ -150,9 +151,15 @@ def highpassed(values: np.ndarray, rate_hz: float, corner_hz: float) -> np.ndarr
     if not corner_hz:
         return values
     # Subtract the first value, so that a constant part causes no transient at the start.
-    return sosfilt(
-        butter(ORDER, corner_hz, "highpass", fs=rate_hz, output="sos"), values - values[0]
-    )
+    return sosfilt(_high_pass(corner_hz, rate_hz), values - values[0])
+
+
+@lru_cache(maxsize=8)
+def _high_pass(corner_hz: float, rate_hz: float) -> np.ndarray:
+    """Sections (1, 6) of the high pass. A receiver uses its own several times, and a design takes
+    longer than its use.
+    """
+    return butter(ORDER, corner_hz, "highpass", fs=rate_hz, output="sos")
 
 
 def clipped(values: np.ndarray, limit_rms: float) -> np.ndarray:

@@ -40,7 +40,8 @@ def at_symbol_rate(record: Record, twin: Twin, baseband: Baseband | None = None)
     values, rate_hz = baseband or read(record)
     if record.channel == "real" and twin.channel == "complex":
         raise InputError(
-            f"{record.file}: channel 'real', but the radar has a complex channel, expected in-phase and quadrature"
+            f"{record.file}: channel 'real', but the radar has a complex channel, expected in-phase"
+            " and quadrature"
         )
     if record.channel == "complex" and twin.channel == "real":
         values = values.real
@@ -74,14 +75,14 @@ def looks(record: Record, twin: Twin, baseband: Baseband | None = None) -> Looks
     gone = _shares(lost(baseband.values), edges) > CLIPPED_SHARE
     if gone.all():
         raise InputError(
-            f"{record.file}: samples are lost in every window, exact zeros in a row, expected a recording "
-            "without gaps"
+            f"{record.file}: samples are lost in every window, exact zeros in a row, expected a"
+            " recording without gaps"
         )
     if (share > CLIPPED_SHARE).all():
         raise InputError(
-            f"{record.file}: clipped, {100 * share.mean():.3g} % of the samples stick to the extremes "
-            f"{baseband.values.real.min():.6g} and {baseband.values.real.max():.6g}, in every window of "
-            f"{twin.symbols * twin.symbol_interval_s:.3g} s"
+            f"{record.file}: clipped, {100 * share.mean():.3g} % of the samples stick to the"
+            f" extremes {baseband.values.real.min():.6g} and {baseband.values.real.max():.6g}, in"
+            f" every window of {twin.symbols * twin.symbol_interval_s:.3g} s"
         )
     return Looks(intervals, share > CLIPPED_SHARE, gone)
 

@@ -22,7 +22,7 @@ from lowalt.extensions.town.building_surfaces import (
 from lowalt.extensions.town.building_tags import height_of, is_building, is_part, low_of
 from lowalt.extensions.town.materials import named
 from lowalt.files.atomic import text_of
-from lowalt.files.errors import InputError, in_one_line, lacking, reading
+from lowalt.files.errors import InputError, in_one_line, missing_package, reading
 from lowalt.files.json_objects import json_object
 
 try:
@@ -31,7 +31,7 @@ try:
     from shapely.geometry import MultiPolygon, Polygon, shape
     from shapely.geometry.polygon import orient
 except ImportError as error:
-    raise lacking(error) from None
+    raise missing_package(error) from None
 
 LARGEST_BYTES = 64 << 20
 MOST_PLACES = MOST_TRIANGLES // 3

@@ -78,7 +78,7 @@ class NamedEffect(NamedTuple):
 
     @property
     def idle(self) -> bool:
-        """Whether the settings change nothing."""
+        """Whether the settings hold a set of IDLE (`contract`), with which the effect does nothing."""
         for entry in getattr(self.module, "IDLE", ()):
             if all(self.settings[key] == value for key, value in entry.items()):
                 return True

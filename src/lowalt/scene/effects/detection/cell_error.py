@@ -29,15 +29,16 @@ def check(settings: dict, scene: CheckedScene) -> None:
 def choose(
     settings: dict, chosen: np.ndarray, cells: np.ndarray, look: Look, rng: np.random.Generator
 ) -> np.ndarray:
-    """Return chosen cells (N,) int64, each wrong with `probability`.
+    """Return the chosen cells (N,) int64, each wrong with `probability`.
 
-    cells: (N, M), which wrap around as ranges do.
-
-    A wrong cell is off by a whole number, uniform on -spread .. spread without 0. 2 N draws.
+    cells: (N, M), which wrap around as ranges do. A wrong cell is off by a whole number of cells,
+    uniform on -spread_cells .. spread_cells without 0. 2 N numbers are drawn.
     """
-    wrong, place = rng.random((2, len(chosen)))
-    reach = settings["spread_cells"]
-    step = np.minimum((place * (2 * reach)).astype(np.int64), 2 * reach - 1) - reach
-    step += step >= 0
-    moved = np.where(wrong < settings["probability"], step, 0)
+    wrong, position = rng.random((2, len(chosen)))
+    spread = settings["spread_cells"]
+    # A whole number of 0 .. 2 spread - 1; then -spread .. -1 and, past the gap at 0, 1 .. spread.
+    number = np.minimum((position * (2 * spread)).astype(np.int64), 2 * spread - 1)
+    error = number - spread
+    error += error >= 0
+    moved = np.where(wrong < settings["probability"], error, 0)
     return np.asarray(chosen + moved, np.int64) % cells.shape[1]

@@ -1,10 +1,14 @@
 """Analogue-to-digital converter: a uniform mid-rise quantiser with clipping, on I and Q alike.
 
-The gain is set once per look, by the look's root mean square. A look whose level changes from
-symbol to symbol has symbols far above it, which clip: where a twentieth of the symbols is 6 dB
-stronger, 8 bits at the default back-off of 12 dB give 29 dB of signal to error instead of the 41 dB
-of quantisation alone. A larger `backoff_db` removes the clipping and costs 1 dB of quantisation per
-dB: at 18 dB the same look has 35 dB.
+The gain is set once per look, by the look's root mean square. In a look whose level changes from
+symbol to symbol the strongest symbols clip. A larger `backoff_db` removes the clipping, and every
+dB of it costs 1 dB of the ratio of signal to quantisation error. With 8 bits:
+
+| symbols of the look | `backoff_db` | signal over error |
+|---|---|---|
+| of equal power | 12 (default) | 41 dB |
+| one in twenty 6 dB stronger | 12 (default) | 29 dB |
+| one in twenty 6 dB stronger | 18 | 35 dB |
 """
 
 import numpy as np
@@ -23,19 +27,20 @@ IDLE = [{"bits": None}, {"bits": 0}]
 def quantise(samples: np.ndarray, bits: int, full_scale: float) -> np.ndarray:
     """Return samples with I and Q at the middles of 2^bits steps of [-full_scale, full_scale].
 
-    A component outside the range is put in the outermost step. Source: Gersho and Gray 1992, ch. 5.
+    A component outside the range takes the middle of the outermost step. Source: Gersho and Gray 1992, ch. 5.
     """
+    half_of_steps = 2.0 ** (bits - 1)
+    # 2 full_scale / 2^bits.
     step = full_scale * 2.0 ** (1 - bits)
     components = np.ascontiguousarray(samples, np.complex128).view(np.float64)
-    half = 2.0 ** (bits - 1)
-    code = np.clip(np.floor(components / step), -half, half - 1)
+    code = np.clip(np.floor(components / step), -half_of_steps, half_of_steps - 1)
     return ((code + 0.5) * step).view(np.complex128)
 
 
-def full_scale(samples: np.ndarray, backoff_db: float) -> float:
-    """Return the converter's range.
+def full_scale_of(samples: np.ndarray, backoff_db: float) -> float:
+    """Return the full scale of the converter, the largest level of I or Q that does not clip.
 
-    It is a component's root mean square over the look, times the back-off.
+    It is the root mean square of I and Q over the look, raised by the back-off.
     """
     power = np.mean(samples.real**2 + samples.imag**2)
     return float(np.sqrt(power / 2)) * 10 ** (backoff_db / 20)
@@ -48,7 +53,7 @@ def receive(
 
     A look of zeros stays zeros. Source: Bennett 1948; nothing is drawn.
     """
-    scale = full_scale(samples, settings["backoff_db"])
-    if scale == 0:
+    full_scale = full_scale_of(samples, settings["backoff_db"])
+    if full_scale == 0:
         return samples
-    return quantise(samples, settings["bits"], scale)
+    return quantise(samples, settings["bits"], full_scale)

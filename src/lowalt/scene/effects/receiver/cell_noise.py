@@ -45,9 +45,9 @@ def check(settings: dict, scene: CheckedScene) -> None:
 def receive(
     settings: dict, samples: np.ndarray, look: Look, rng: np.random.Generator
 ) -> np.ndarray:
-    """Return samples (N, M) plus circular white Gaussian noise.
+    """Return samples (N, M) plus circular white Gaussian noise, the same in each range cell.
 
-    It is `snr_db` below the target's echo in each range cell.
+    Its power in a cell is `snr_db` below that of the target's echo.
 
     A range cell is the mean of M subcarriers and each of these the sum of M samples, so a sample
     has a cell's noise. Nothing is added while snr_db is null: the scene gives each of noise.snr_db
@@ -55,4 +55,5 @@ def receive(
     """
     if settings["snr_db"] is None:
         return samples
-    return samples + white(rng, look.reference * 10 ** (-settings["snr_db"] / 10), samples.shape)
+    power = look.reference * 10 ** (-settings["snr_db"] / 10)
+    return samples + white(rng, power, samples.shape)

@@ -1,6 +1,4 @@
-"""Sampling-clock offset: the converter's clock runs fast or slow.
-
-It is compared with the clock that made the symbols.
+"""Sampling-clock offset: the converter's clock runs faster or slower than the one of the symbols.
 
 Sample instants shrink within a symbol, and the window slips from symbol to symbol, so ranges drift:
 by c n T_r e / 2 until symbol n, where e is the relative error of the clock.
@@ -75,14 +73,16 @@ def receive(
     result = fft.ifft(term, axis=-1)
     step = 2 * np.pi * look.sample_s * shift_hz
     away = np.arange(samples.shape[1]) - middle
-    size = reach = float(abs(step).max() * abs(away).max())
+    largest_turn = float(abs(step).max() * abs(away).max())
+    # `size` is the largest term of this order; times the exponential it bounds all later ones.
+    size = largest_turn
     order = 1
-    while size * math.exp(reach) > ROUNDING:
+    while size * math.exp(largest_turn) > ROUNDING:
         # exp(j step away) is the sum over k of (j step)^k away^k / k!.
         term = term * (1j * step / order)
         result += fft.ifft(term, axis=-1) * away.astype(float) ** order
         order += 1
-        size *= reach / order
+        size *= largest_turn / order
     return result
 
 
@@ -97,5 +97,5 @@ def displaced(settings: dict, view: View, rng: np.random.Generator) -> Displacem
 
 
 def _rate(settings: dict, rng: np.random.Generator) -> float:
-    """The clock's relative error e, positive where it is fast."""
+    """Return the clock's relative error e, positive if it is fast."""
     return 1e-6 * (settings["fixed_ppm"] + settings["sigma_ppm"] * offsets.drawn(rng))

@@ -43,16 +43,17 @@ def receive(
     """
     if look.station.transmitter is None:
         return samples
-    late_s, rise_hz = map(float, _of(settings, look.network, look.station, rng))
-    return risen(delayed(samples, late_s, look), rise_hz, look)
+    offsets = _link_offsets(settings, look.network, look.station, rng)
+    late = delayed(samples, float(offsets.delay_s), look)
+    return risen(late, float(offsets.rise_hz), look)
 
 
 def displaced(settings: dict, view: View, rng: np.random.Generator) -> Displacement:
     """Return the offsets of a link in delay and frequency, drawn as `receive` draws them."""
-    return _of(settings, view.network, view.station, rng)
+    return _link_offsets(settings, view.network, view.station, rng)
 
 
-def _of(
+def _link_offsets(
     settings: dict, network: Network, station: Station, rng: np.random.Generator
 ) -> Displacement:
     """Return the errors of the sender minus those of the receiver.
@@ -64,7 +65,8 @@ def _of(
     if sends is None or hears is None:
         return Displacement()
     errors = of_stations(settings, network, rng)
-    ppm, late_s = (
-        theirs - ours for theirs, ours in zip(errors[sends.name], errors[hears.name], strict=True)
-    )
+    sender_ppm, sender_late_s = errors[sends.name]
+    receiver_ppm, receiver_late_s = errors[hears.name]
+    ppm = sender_ppm - receiver_ppm
+    late_s = sender_late_s - receiver_late_s
     return Displacement(late_s, 1e-6 * ppm * oscillator_hz(network, station))

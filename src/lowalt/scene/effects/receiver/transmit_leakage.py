@@ -27,9 +27,8 @@ STILL = True
 
 def check(settings: dict, scene: CheckedScene) -> None:
     """Raise InputError where the receiver has an oscillator of its own."""
-    apart: list[str] = [
-        name for name in ("carrier_offset", "clock_offset") if name in scene.effects
-    ]
+    offsets = ("carrier_offset", "clock_offset")
+    apart = [name for name in offsets if name in scene.effects]
     if not scene.effects.get("phase_noise", {"shared": True})["shared"]:
         apart.append("phase_noise with shared: false")
     if apart:

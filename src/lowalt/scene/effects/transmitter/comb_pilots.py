@@ -1,6 +1,4 @@
-"""Comb pilots: only every K-th subcarrier carries known symbols.
-
-Ranges then repeat after M / K cells.
+"""Comb pilots: only every K-th subcarrier carries known symbols; ranges repeat after M / K cells.
 
 The range cells of a comb are as long as those of the whole band; there are M / K of them, and
 farther echoes fold into them. A cell is the mean of M / K subcarriers, so its noise is 10 lg K
@@ -23,10 +21,7 @@ UNMODELLED = ("fmcw", "cw")
 
 
 def check(settings: dict, scene: CheckedScene) -> None:
-    """Raise InputError for a comb that does not divide the band.
-
-    Raise it also for an offset beyond its first tooth.
-    """
+    """Raise InputError for a comb that does not divide the band, or too large an offset."""
     count = scene.network.subcarriers
     spacing = settings["spacing"]
     offset = settings["offset"]
@@ -46,5 +41,7 @@ def range_cells(settings: dict, response: np.ndarray) -> np.ndarray:
     spacing = settings["spacing"]
     offset = settings["offset"]
     cells = fft.ifft(response[:, offset::spacing], axis=1)
-    # The comb's first tooth has the phase of its own subcarrier in every range cell.
-    return cells * np.exp(2j * np.pi * offset * np.arange(cells.shape[1]) / response.shape[1])
+    # The transform takes the comb's first subcarrier for subcarrier 0; this is the phase of its own
+    # frequency in every range cell.
+    cell_numbers = np.arange(cells.shape[1])
+    return cells * np.exp(2j * np.pi * offset * cell_numbers / response.shape[1])
