@@ -188,9 +188,11 @@ def card(content: ModelFile, accuracy: list[dict[str, str]], name: str) -> str:
         limits = LIMITS
     sections = [
         f"---\n{yaml.safe_dump(front, sort_keys=False)}---\n\n# {name}\n",
-        f"A network that tells {', '.join(state['classes'])} apart by their echoes at {where} by "
-        f"lowalt {__version__}.\nProtocol {state['protocol']}: "
-        f"{MEANING.get(state['protocol'], 'of the user')}.\n",
+        (
+            f"A network that tells {', '.join(state['classes'])} apart by their echoes at {where}"
+            f" by lowalt {__version__}.\nProtocol {state['protocol']}:"
+            f" {MEANING.get(state['protocol'], 'of the user')}.\n"
+        ),
         "## Training\n",
         _table(("entry", "value"), _facts(content)),
         "## Accuracy\n",

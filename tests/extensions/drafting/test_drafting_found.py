@@ -38,9 +38,10 @@ def disc(at, radius: float = 0.1, height: float = 0.006) -> trimesh.Trimesh:
 def draft(path: Path, *words: str) -> tuple[int, Path]:
     """Exit status of `target new` and the record it writes."""
     out = path.with_suffix(".yaml")
-    return main(
-        ["target", "new", str(path), "--inputs", str(path.parent), "--out", str(out), *words]
-    ), out
+    return (
+        main(["target", "new", str(path), "--inputs", str(path.parent), "--out", str(out), *words]),
+        out,
+    )
 
 
 @pytest.fixture

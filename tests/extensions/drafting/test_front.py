@@ -103,7 +103,10 @@ def test_a_mirror_plane_and_long_sides_are_guesses_and_without_any_evidence_the_
 def test_evidence_that_contradicts_itself_or_the_user_is_refused_with_the_option_that_resolves_it():
     named = {"front_bumper": (1, 0), "rear_bumper": (-1, 0)}
     car = shape("Vehicle", named, wheels([1, 0, 0]))
-    words = "names such as 'front_bumper' say that the front is x, the wheel axles that it is y: give --front=x or"
+    words = (
+        "names such as 'front_bumper' say that the front is x, the wheel axles that it is y: give"
+        " --front=x or"
+    )
     with pytest.raises(InputError, match=words):
         front_of(car, None, "x", "x")
     assert front_of(car, "y", "x", "x").axis == "y"

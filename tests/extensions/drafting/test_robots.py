@@ -179,7 +179,10 @@ def test_a_namespace_an_optional_variable_and_macros_of_sensors_change_nothing(t
     plain = inputs / "craft/craft.urdf"
     other = inputs / "craft/other.urdf"
     plain.write_text(urdf())
-    more = '<gazebo reference="base"><a b="${c}"/></gazebo><link name="imu"/><joint name="imu" type="fixed"><origin '
+    more = (
+        '<gazebo reference="base"><a b="${c}"/></gazebo><link name="imu"/><joint name="imu"'
+        ' type="fixed"><origin '
+    )
     more += 'xyz="$(optenv IMU_XYZ 0.19 0 0.149)"/><parent link="base"/><child link="imu"/></joint>'
     other.write_text(urdf(more).replace("<robot ", '<robot xmlns="http://drake.mit.edu" '))
     expected = joints(plain, inputs)[0]
@@ -227,9 +230,10 @@ def test_a_plane_with_one_wheel_and_a_motor_is_asked_for_its_category_and_a_surf
     tmp_path,
 ):
     turning = "".join(
-        f'<link name="{name}"><visual><geometry><box size="{size}"/></geometry></visual></link><joint '
-        f'name="{name}_joint" type="continuous"><origin xyz="{at}"/><parent link="base"/><child '
-        f'link="{name}"/><axis xyz="{axis}"/></joint>'
+        f'<link name="{name}"><visual><geometry><box'
+        f' size="{size}"/></geometry></visual></link><joint name="{name}_joint"'
+        f' type="continuous"><origin xyz="{at}"/><parent link="base"/><child link="{name}"/><axis'
+        f' xyz="{axis}"/></joint>'
         for name, size, at, axis in (
             ("main_wheel", "0.1 0.03 0.1", "0 0 -0.1", "0 1 0"),
             ("motor", "0.01 0.2 0.02", "0.4 0 0", "1 0 0"),
@@ -265,12 +269,16 @@ def test_a_plane_with_one_wheel_and_a_motor_is_asked_for_its_category_and_a_surf
 
 def test_a_rover_s_cylinders_become_wheels_with_a_row_of_its_size(tmp_path, capsys):
     wheels = "".join(
-        f'<link name="wheel_{index}"><visual><origin rpy="1.5708 0 0"/><geometry><cylinder radius="0.1" length="0.06"/>'
-        f'</geometry></visual></link><joint name="axle_{index}" type="continuous"><origin xyz="{x} {y} 0.1"/>'
-        f'<parent link="base"/><child link="wheel_{index}"/><axis xyz="0 1 0"/></joint>'
+        f'<link name="wheel_{index}"><visual><origin rpy="1.5708 0 0"/><geometry><cylinder'
+        f' radius="0.1" length="0.06"/></geometry></visual></link><joint name="axle_{index}"'
+        f' type="continuous"><origin xyz="{x} {y} 0.1"/><parent link="base"/><child'
+        f' link="wheel_{index}"/><axis xyz="0 1 0"/></joint>'
         for index, (x, y) in enumerate([(0.3, 0.2), (0.3, -0.2), (-0.3, 0.2), (-0.3, -0.2)])
     )
-    text = '<robot name="r"><link name="base"><visual><origin xyz="0 0 0.25"/><geometry><box size="0.8 0.3 0.2"/>'
+    text = (
+        '<robot name="r"><link name="base"><visual><origin xyz="0 0 0.25"/><geometry><box size="0.8'
+        ' 0.3 0.2"/>'
+    )
     (tmp_path / "rover.urdf").write_text(f"{text}</geometry></visual></link>{wheels}</robot>")
     records, cloud = made(tmp_path / "rover.urdf", tmp_path)
     row = records["rover"]["row"]
@@ -363,9 +371,12 @@ def test_a_description_whose_propellers_are_fixed_is_looked_at_like_a_mesh(
             "in a circle|at most 200",
         ),
         (
-            '<sdf><model name="a"><link name="l"><pose relative_to="l">0 0 0 0 0 0</pose><visual '
-            'name="v"><geometry>'
-            "<sphere><radius>1</radius></sphere></geometry></visual></link></model></sdf>",
+            (
+                '<sdf><model name="a"><link name="l"><pose relative_to="l">0 0 0 0 0'
+                " 0</pose><visual "
+                'name="v"><geometry>'
+                "<sphere><radius>1</radius></sphere></geometry></visual></link></model></sdf>"
+            ),
             "hangs on itself",
         ),
     ],

@@ -392,7 +392,10 @@ def test_eight_columns_offer_the_pairs_of_four_real_and_four_imaginary_ones(tmp_
 
 def test_compressed_sound_is_refused_with_what_to_do(tmp_path):
     (tmp_path / "a.mp3").write_bytes(b"ID3")
-    words = r"a.mp3: .mp3 keeps what ears hear and drops faint lines of a radar, expected the recording as it was made"
+    words = (
+        r"a.mp3: .mp3 keeps what ears hear and drops faint lines of a radar, expected the recording"
+        r" as it was made"
+    )
     with pytest.raises(InputError, match=words):
         read(entry(tmp_path, "a.mp3"))
     with pytest.raises(InputError, match=words):

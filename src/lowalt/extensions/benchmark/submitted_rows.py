@@ -80,8 +80,8 @@ def read(folder: str | Path) -> Submission:
     for name in ("method", "chosen_on", "code"):
         if not PLAIN.fullmatch(str(card[name])):
             raise InputError(
-                f"{folder}/card.yaml: {name} is {shown(card[name])}, expected text that begins with a "
-                "letter or digit, without <>|=` and control characters"
+                f"{folder}/card.yaml: {name} is {shown(card[name])}, expected text that begins with"
+                " a letter or digit, without <>|=` and control characters"
             )
     answers: dict[str, list[Path]] = {}
     for path in sorted(folder.glob("*.csv")):
