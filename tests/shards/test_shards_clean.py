@@ -12,6 +12,7 @@ import pytest
 import yaml
 
 from dataset import CONFIG, SEED, SNRS, build
+from hub_library import loaded
 from lowalt.config.network import Network
 from lowalt.files.errors import InputError
 from lowalt.noise.awgn import noisy_signals
@@ -275,9 +276,7 @@ def test_webdataset_gives_the_samples_of_signal_shards(published, noised):
 
 
 def test_the_hubs_library_reads_clean_echoes_by_the_card(published, tmp_path, monkeypatch):
-    from test_shards_tools import loaded
-
-    rows = loaded(published, tmp_path, monkeypatch, str(published), "unseen")["test"]
+    rows = loaded(published, tmp_path, monkeypatch, "unseen")["test"]
     assert len(rows) == 4
     for row in rows:
         assert row["json"]["snr_db"] == [3.0, math.inf] and row["json"]["noise"] == [True, False]

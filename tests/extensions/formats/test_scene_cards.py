@@ -11,6 +11,7 @@ import pytest
 import yaml
 
 import towns
+from hub_library import loaded
 from lowalt.__main__ import main
 from lowalt.config.layers import overlaid
 from lowalt.shards import ShardSet
@@ -27,15 +28,6 @@ FEW = {
     "motion": {"models": 4, "models_per_chunk": 4, "looks": None},
     "split": {"by": "motion", "train": 2, "val": 1, "test": 1},
 }
-
-
-def loaded(folder, name, tmp_path, monkeypatch):
-    """A protocol of the data set as the hub's library reads it from a folder, no internet asked."""
-    monkeypatch.setenv("HF_HOME", str(tmp_path))
-    monkeypatch.setenv("HF_DATASETS_OFFLINE", "1")
-    datasets = pytest.importorskip("datasets")
-    datasets.disable_progress_bars()
-    return datasets.load_dataset(str(folder), name, cache_dir=str(tmp_path / "cache"))
 
 
 def text(value):
@@ -86,7 +78,7 @@ def read_by_hub(shards, numbers, tmp_path, monkeypatch):
     folder = shards.index_path.parent
     card = (folder / "README.md").read_text()
     for protocol in yaml.safe_load(card.split("---")[1])["configs"]:
-        found = loaded(folder, protocol["config_name"], tmp_path, monkeypatch)
+        found = loaded(folder, tmp_path, monkeypatch, protocol["config_name"])
         for rows in found.values():
             for row in rows:
                 key = row["__key__"]

@@ -11,6 +11,7 @@ import pytest
 import yaml
 
 from dataset import CONFIG, build
+from hub_library import loaded
 from lowalt.extensions.formats.sigmf import main as sigmf
 from lowalt.files.errors import InputError
 from lowalt.shards import ShardSet
@@ -37,15 +38,6 @@ def published(request, tmp_path_factory):
     return folder
 
 
-def loaded(folder, tmp_path, monkeypatch, *names):
-    """The data set as the hub's library reads it from a folder, no internet asked."""
-    monkeypatch.setenv("HF_HOME", str(tmp_path))
-    monkeypatch.setenv("HF_DATASETS_OFFLINE", "1")
-    datasets = pytest.importorskip("datasets")
-    datasets.disable_progress_bars()
-    return datasets.load_dataset(*names, cache_dir=str(tmp_path / "cache"))
-
-
 def test_the_hubs_library_reads_every_protocol_by_the_card(published, tmp_path, monkeypatch):
     shards = ShardSet(published / "index.json")
     numbers = {key.decode(): number for number, key in enumerate(shards.keys.tolist())}
@@ -54,7 +46,7 @@ def test_the_hubs_library_reads_every_protocol_by_the_card(published, tmp_path, 
         "unseen": {"train": 8, "validation": 4, "test": 8},
     }
     for protocol, expected in counts.items():
-        found = loaded(published, tmp_path, monkeypatch, str(published), protocol)
+        found = loaded(published, tmp_path, monkeypatch, protocol)
         assert {split: len(rows) for split, rows in found.items()} == expected
         assert found["test"].features["json"]["label"].names == list(shards.classes)
         for row in found["test"]:
