@@ -153,6 +153,7 @@ def _empty(
     """Which of the sound windows (n,) bool, by their starts (n,) s, lie where the record says that
     nothing was.
     """
+    assert record.empty_s is not None  # asked only of a record that states it
     first, last = record.empty_s
     window_s = twin.symbols * twin.symbol_interval_s
     inside = sound & (starts_s >= first) & (starts_s + window_s <= last)

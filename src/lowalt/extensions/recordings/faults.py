@@ -89,10 +89,9 @@ def _cut(values: np.ndarray) -> np.ndarray:
     starts = np.flatnonzero(np.diff(values, prepend=np.nan) != 0)
     levels = values[starts]
     lengths = np.diff(starts, append=len(values))
-    step = max(
-        float(np.diff(np.unique(values)).min()),
-        float(np.abs(values).max()) * np.finfo(np.float32).eps,
-    )
+    smallest_step = float(np.diff(np.unique(values)).min())
+    rounding_step = float(np.abs(values).max()) * float(np.finfo(np.float32).eps)
+    step = max(smallest_step, rounding_step)
     top = np.flatnonzero(
         (lengths >= CLIPPED_RUN) & ((levels == values.max()) | (levels == values.min()))
     )

@@ -99,7 +99,7 @@ class FileInspection:
 
 def _of_columns(table: Table) -> list[Candidate]:
     """Readings of a table of a few columns: pairs as I and Q, each alone as a real channel."""
-    names = table.names or tuple(range(len(table.columns)))
+    names: tuple[str | int, ...] = table.names or tuple(range(len(table.columns)))
     roles = dict(zip(names, [role(str(name)) for name in names], strict=True))
     kept = [
         (name, column)
@@ -152,9 +152,10 @@ def _of_chirps(array: np.ndarray) -> list[Candidate]:
     result = []
     for samples, stream in ((array.shape[-1], array), (array.shape[0], array.T)):
         length, strength = chirp_length(np.ascontiguousarray(stream).reshape(-1))
-        keys = {"channel": "complex", "chirps": {"samples": samples}}
+        chirps = {"samples": samples}
         if array.ndim > 2 and samples == array.shape[-1] and 1 < array.shape[-2] <= 16:
-            keys["chirps"]["receivers"] = array.shape[-2]
+            chirps["receivers"] = array.shape[-2]
+        keys = {"channel": "complex", "chirps": chirps}
         result.append(Candidate(keys, 8.0 - strength * (length == samples)))
     return result
 

@@ -170,7 +170,7 @@ def _refuse_misread(table: Table, record: Record) -> None:
     ):
         return
     own = RAW.get(path.suffix.lower(), ())
-    dtype = record.dtype or next(iter(own), "")
+    dtype = record.dtype or next(iter(own), "") or ""
     layout = record.layout
     if layout is None and record.dtype is None:
         layout = next(iter(own[1:]), None)
@@ -223,6 +223,7 @@ def read(record: Record) -> Baseband:
     table = table_of(record)
     times = times_of(table, record)
     if record.trust == "record":
+        assert record.rate_hz is not None  # `trust: record` is refused without it.
         rate = float(record.rate_hz)
     else:
         rate = faults.agreed_rate(path, record.rate_hz, table.rate_hz, times)

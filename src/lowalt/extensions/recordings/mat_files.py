@@ -16,6 +16,7 @@ import tempfile
 import zlib
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any, Literal
 
 import numpy as np
 
@@ -59,7 +60,7 @@ def read_mat(path: Path) -> dict[str, np.ndarray]:
             return {name: data[str(number)] for number, name in enumerate(names)}
 
 
-def _fields(name: str, value: object, depth: int = 0) -> Iterator[tuple[str, np.ndarray]]:
+def _fields(name: str, value: Any, depth: int = 0) -> Iterator[tuple[str, np.ndarray]]:
     """Name and array of each numeric value below a variable of an older file."""
     dtype = getattr(value, "dtype", None)
     if dtype is not None and dtype.names and value.size == 1 and depth < DEEPEST:
@@ -76,7 +77,7 @@ def _refuse_expanding(source: str, most: int) -> None:
     total = 0
     with Path(source).open("rb") as file:
         head = file.read(128)
-        order = "big" if head[126:128] == b"MI" else "little"
+        order: Literal["big", "little"] = "big" if head[126:128] == b"MI" else "little"
         while len(tag := file.read(8)) == 8:
             kind = int.from_bytes(tag[:4], order)
             size = int.from_bytes(tag[4:], order)
@@ -167,7 +168,7 @@ def main(arguments: list[str]) -> None:
         start = file.read(520)
     read = _new if HDF5 in (start[:8], start[512:]) else _old
     variables = read(source, int(most))
-    arrays = {str(number): value for number, value in enumerate(variables.values())}
+    arrays: dict[str, Any] = {str(number): value for number, value in enumerate(variables.values())}
     np.savez(out, names=np.array(json.dumps(list(variables))), **arrays)
 
 

@@ -44,7 +44,7 @@ def snr_range(record: Record, twin: Twin, baseband: Baseband) -> list[float]:
 
     Raises: InputError as `windows`.
     """
-    if "snr_db" in record.twin:
+    if record.twin is not None and "snr_db" in record.twin:
         return list(record.twin["snr_db"])
     power, heard = heard_powers(windows(record, twin, baseband), twin)
     floor = noise_floor(power, 2 * twin.edge_mps / twin.symbols)[heard].sum()

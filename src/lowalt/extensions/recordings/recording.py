@@ -175,7 +175,8 @@ def _next(inspection: FileInspection, seen: Seen, out: Path) -> str:
     names = [
         name
         for name, twin in radars().items()
-        if twin.near(inspection.carrier_hz)
+        if inspection.carrier_hz
+        and twin.near(inspection.carrier_hz)
         and (twin.channel == "real" or seen.keys["channel"] == "complex")
     ]
     if names:
