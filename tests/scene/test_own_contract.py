@@ -95,7 +95,7 @@ def test_rules_take_its_files_clouds_and_surfaces_and_its_share_of_the_record(us
     assert json.loads(ShardsStage(run).settings(CHUNK))["record"] == rain
     assert ShardsStage(run).modules == ["rain.py"]
     run.config["recognition"]["input"] = "dataset"
-    assert "surfaces" in RecognitionStage(run).samples(CHUNK)
+    assert "occluders" in RecognitionStage(run).samples(CHUNK)
 
 
 @pytest.mark.parametrize(

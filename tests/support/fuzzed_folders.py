@@ -2,6 +2,7 @@
 file.
 """
 
+import contextlib
 import functools
 import math
 import os
@@ -73,11 +74,7 @@ def _page(run: Path) -> None:
     # The command names the run by its place below the working directory.
     with (
         mock.patch("lowalt.commands.workflow.ended", return_value={"status": 0}),
-        mock.patch.object(
-            Path,
-            "resolve",
-            lambda path: path.parent / path.name if path.is_absolute() else run.parents[1] / path,
-        ),
+        contextlib.chdir(run.parents[1]),
     ):
         _told("report", str(run))
 

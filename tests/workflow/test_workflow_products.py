@@ -41,7 +41,7 @@ def test_samples_made_on_the_spot_need_clouds_and_surfaces_only_where_points_are
             "clouds": [f"{BASE}/clouds/{subtype}.npz" for subtype in subtypes],
         }
         if effects:
-            files["surfaces"] = [f"{BASE}/occluders/{subtype}.npz" for subtype in subtypes]
+            files["occluders"] = [f"{BASE}/occluders/{subtype}.npz" for subtype in subtypes]
         assert stages.recognition.samples(wildcards) == files
 
 
