@@ -19,7 +19,6 @@ from typing import Any
 
 from lowalt.config.command import user_errors_in_one_line
 from lowalt.files.atomic import FULL
-from lowalt.files.atomic import FULL
 from lowalt.files.errors import InputError
 from lowalt.machine.run_pipe import end_with_starter, hold_pipe
 from lowalt.workflow.locks import (
