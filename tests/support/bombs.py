@@ -10,14 +10,30 @@ import struct
 import zlib
 from collections.abc import Callable
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
+import pytest
 
 from lowalt.files.errors import InputError
 
 MEGABYTES = 500
 SECONDS = 8
 """Address space and processor time that a reader may take before it refuses a file."""
+
+
+class Bomb(NamedTuple):
+    """A file, its reader and the sentence that refuses it.
+
+    content: the bytes or text of the file, or a function that returns them; if `writes`, a function
+    that writes the file to a path.
+    """
+
+    name: str
+    content: bytes | str | Callable[[], bytes | str] | Callable[[Path], None]
+    read: Callable[[Path], object]
+    expected: str
+    writes: bool = False
 
 
 def refusal_of(read: Callable[[], object]) -> str:
@@ -141,3 +157,17 @@ def town(*rings: list) -> str:
         for ring in rings
     ]
     return json.dumps({"type": "FeatureCollection", "features": features})
+
+
+def check_refused(bomb: Bomb, folder: Path) -> None:
+    """Assert that a bomb is refused in the expected sentence, which begins with its path."""
+    path = folder / bomb.name
+    if bomb.writes:
+        bomb.content(path)
+    else:
+        content = bomb.content() if callable(bomb.content) else bomb.content
+        path.write_bytes(content.encode() if isinstance(content, str) else content)
+    said = refusal_of(lambda: bomb.read(path))
+    assert said.startswith(f"{path}: ")
+    with pytest.raises(InputError, match=bomb.expected):
+        raise InputError(said)

@@ -7,8 +7,9 @@ import struct
 from pathlib import Path
 
 import numpy as np
+import pytest
 
-from lowalt.targets.mesh_files import pieces
+from lowalt.targets.mesh_files import pieces, stated_unit_m
 
 TETRAHEDRON = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], float)
 FACES = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
@@ -142,3 +143,11 @@ def measures(path: Path) -> tuple[np.ndarray, float, float]:
     a, b, c = np.moveaxis(corners, 1, 0)
     area = np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2
     return np.ptp(corners.reshape(-1, 3), axis=0), area, float((a * np.cross(b, c)).sum() / 6)
+
+
+def check_as_viewers_show(path: Path, extent: list, area: float, volume: float, unit: float | None):
+    """Assert extents, area, enclosed volume and stated unit (m) of a file."""
+    found = measures(path)
+    assert found[0] == pytest.approx(extent, rel=1e-4)
+    assert found[1:] == pytest.approx((area, volume), rel=1e-3)
+    assert stated_unit_m(path) == unit

@@ -1,9 +1,9 @@
 """What a configuration that may be a stranger's cannot choose: code, weights, files elsewhere.
 
-A configuration file counts as a run's, and so perhaps as a stranger's, if its name is config.yaml,
-if it holds every key that a whole configuration needs, or if it stands beside the files of a run or
-a data set. Any other file is an overlay, which its user writes, or reads before use as one reads a
-script.
+A configuration file counts as a run's, and therefore possibly as a stranger's, if its name is
+config.yaml, if it holds every key that a whole configuration needs, or if files of a run or of a
+data set are in its folder. Any other file is an overlay: its user has written it, or must read it
+before use as one reads a script.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -36,10 +36,10 @@ def is_of_run(path: Path, content: Mapping, required: Iterable[str]) -> bool:
 
 
 def refuse_brought(settings: Mapping, where: str | Path) -> None:
-    """Refuse settings of what may be a stranger's file if a text in them names code, or a file or
-    folder that lies neither below the working directory nor beside `where` nor in the package.
+    """Refuse settings of a file that may be a stranger's if a text in them names code or a path.
 
-    No code is run and no file is opened. Links count as what they lead to.
+    Allowed are paths below the working directory, below the folder of `where`, and in the package.
+    No code is run and no file is opened. A link counts as the file that it leads to.
     Raises: InputError naming the key and the text.
     """
     for key, text in _texts(settings):
@@ -65,8 +65,9 @@ def refuse_weights(weights: object, where: str | Path, how: str) -> None:
 
 
 def refuse_training(settings: Mapping, where: str | Path, how: str = OVERLAY) -> None:
-    """Refuse settings of what may be a stranger's file whose networks begin with other weights than
-    random ones, or whose table of schemes names code.
+    """Refuse settings of a file that may be a stranger's if they name weights, or a table with code.
+
+    The table is that of the schemes; a scheme may name a backbone of the user's own.
 
     how: what the user may do instead. Raises: InputError naming the weights or the code.
     """

@@ -67,8 +67,8 @@ class Extension:
     """What `lowalt compare` takes besides runs: modules that offer `compared_named(first,
     second)`."""
     sections: Mapping[str, str] = field(default_factory=dict)
-    """Of the report, by the name of the file in its manifest without which the page has no such
-    section: modules that offer `values(run)` beside a template of the same name."""
+    """Sections of the report: modules that offer `values(run)` and have a template of the same name
+    in their folder, by the file of the report's manifest that a run must have for the section."""
 
 
 KINDS: dict[str, type] = dict.fromkeys((one.name for one in fields(Extension)), str)

@@ -6,10 +6,21 @@ import numpy as np
 import pytest
 
 from lowalt.files.errors import InputError, InputWarning
-from lowalt.targets.mesh_files import pieces, read_mesh, stated_unit_m
+from lowalt.targets.mesh_files import pieces, read_mesh
 from lowalt.workflow.sources import sources
 from real_inputs import FOLDER
-from shown_meshes import CORNERS, FACES, STRIP, TETRAHEDRON, glb, measures, ply, prism, skinned
+from shown_meshes import (
+    CORNERS,
+    FACES,
+    STRIP,
+    TETRAHEDRON,
+    check_as_viewers_show,
+    glb,
+    measures,
+    ply,
+    prism,
+    skinned,
+)
 
 FAULTS = FOLDER / "faults" / "meshes"
 
@@ -27,11 +38,7 @@ FAULTS = FOLDER / "faults" / "meshes"
 def test_small_files_made_for_readers_are_read_as_a_viewer_shows_them(
     name, extent, area, volume, unit
 ):
-    found = measures(FAULTS / name)
-    assert found[0] == pytest.approx(extent, rel=1e-4) and found[1:] == pytest.approx(
-        (area, volume), rel=1e-3
-    )
-    assert stated_unit_m(FAULTS / name) == unit
+    check_as_viewers_show(FAULTS / name, extent, area, volume, unit)
 
 
 @pytest.mark.parametrize("kind", ["ascii", "little", "big"])

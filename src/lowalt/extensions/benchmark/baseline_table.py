@@ -28,7 +28,7 @@ HARDEST.
 """
 DECIDES = ("unseen, median subtype", f"unseen without {' and '.join(HARDEST)}")
 """Heads of the columns BY_SUBTYPE of the track `unseen`."""
-COLUMNS = (
+RESULT = (
     "track",
     "method",
     "seeds",
@@ -38,6 +38,10 @@ COLUMNS = (
     "high",
     *BY_SUBTYPE,
     "macro_f1_percent",
+)
+"""Columns of a method's result on a track, of a baseline as of a submission."""
+COLUMNS = (
+    *RESULT,
     "macro_f1_low",
     "macro_f1_high",
     "group",

@@ -33,7 +33,7 @@ def kept(track: Track) -> dict[str, np.ndarray]:
     if not path.is_file():
         return {}
     checked_archive(path, "baselines")
-    count = models_of(track, *track.samples())[0]
+    samples_of_model, *_ = models_of(track, *track.samples())
     try:
         with np.load(path, allow_pickle=False) as data:
             found = {name: data[name] for name in data.files}
@@ -41,8 +41,11 @@ def kept(track: Track) -> dict[str, np.ndarray]:
         raise InputError(f"{path}: not a file of baselines ({error})") from error
     values = {}
     for name, array in found.items():
-        is_count = array.dtype == np.uint8
-        values[name] = array / count if is_count else array.astype(float)
+        # Correct samples are kept as whole numbers, the values of the track open-set as they are.
+        if array.dtype == np.uint8:
+            values[name] = array / samples_of_model
+        else:
+            values[name] = array.astype(float)
     return values
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from lowalt.extensions.benchmark import submission
-from lowalt.extensions.benchmark.baseline_table import BY_SUBTYPE, CONFIRMED
+from lowalt.extensions.benchmark.baseline_table import BY_SUBTYPE, CONFIRMED, RESULT
 from lowalt.extensions.benchmark.benchmark_tracks import TRACKS, Track
 from lowalt.extensions.benchmark.definition import REFERENCE
 from lowalt.extensions.benchmark.scoring import scores
@@ -39,15 +39,7 @@ whom to ask, and its licence."""
 TABLE = "submissions.csv"
 COLUMNS = (
     "submission",
-    "track",
-    "method",
-    "seeds",
-    "chosen_on",
-    "percent",
-    "low",
-    "high",
-    *BY_SUBTYPE,
-    "macro_f1_percent",
+    *RESULT,
     *CONFIRMED,
     "answers_sha256",
     "code",

@@ -88,22 +88,18 @@ def answers(trained: Trained, settings: dict, record: Record, where: str) -> Ans
     radar = Twin.from_settings(settings["radar"])
     if not radar.near(record.carrier_hz):
         near = [name for name, other in known.items() if other.near(record.carrier_hz)]
+        expected = f"a network of {near}"
+        if not near:
+            expected = "a network of your own radar, which `lowalt recording train` makes; the zoo has none"
         raise InputError(
             f"{where}: carrier_hz is {record.carrier_hz:.3g}, and {trained.path.stem} knows"
-            f" {radar.carrier_hz:.3g}, "
-            + (
-                f"expected a network of {near}"
-                if near
-                else (
-                    "expected a network of your own radar, which "
-                    "`lowalt recording train` makes; the zoo has none"
-                )
-            )
+            f" {radar.carrier_hz:.3g}, expected {expected}"
         )
     twin = radar.at_carrier(record.carrier_hz)
     baseband = read(record)
     found = looks(record, twin, baseband)
     intervals = found.intervals.astype(np.complex64)
+    # First the windows whose samples can be used, below those of them that hold a target.
     there = ~(found.clipped | found.lost)
     shown = intervals.copy()
     shown[there] = without_hum(intervals[there], twin)
@@ -117,11 +113,9 @@ def answers(trained: Trained, settings: dict, record: Record, where: str) -> Ans
     values = baseband.values if twin.channel == "complex" else baseband.values.real
     beyond = beyond_mps(values, baseband.rate_hz, twin, count)
     starts = numbers * twin.symbols * twin.symbol_interval_s
-    empty = (
-        intervals[_empty(record, starts, twin, where, there)]
-        if record.empty_s and not twin.slowest_mps
-        else None
-    )
+    empty = None
+    if record.empty_s and not twin.slowest_mps:
+        empty = intervals[_empty(record, starts, twin, where, there)]
     there[there] = present(intervals[there], twin, empty)
     there &= ~np.isfinite(beyond)
     shares[there] = followed(shares[there], starts[there])
@@ -132,11 +126,12 @@ def answers(trained: Trained, settings: dict, record: Record, where: str) -> Ans
 
 
 def followed(shares: np.ndarray, starts_s: np.ndarray) -> np.ndarray:
-    """Return class probabilities (n, classes) of windows with a target as those of its track: the
-    geometric mean over the windows within `FOLLOWED_S`, of which no class is below `LEAST_SHARE`.
+    """Return the class probabilities (n, classes) of windows, each averaged over those near it.
 
-    starts_s: (n,) s, rising. What drives past or walks is the same thing a second later, although a
-    window may show it abeam, or on its turn.
+    The average is the geometric mean over the windows that start within `FOLLOWED_S`; a probability
+    below `LEAST_SHARE` counts as that. A target is of one class throughout, although a single
+    window may show it abeam or while it turns.
+    shares: (n, classes) of the windows with a target; starts_s: (n,) s, ascending.
     """
     within_s = FOLLOWED_S * (1 + 1e-9)
     first = np.searchsorted(starts_s, starts_s - within_s)

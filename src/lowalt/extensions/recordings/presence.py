@@ -19,15 +19,13 @@ QUIET_SHARE = 0.1
 FLOOR_MPS = 0.5
 """Speeds to either side over which the noise floor is smooth."""
 CONTINUES_DB = 12.0
-"""Level over the noise floor of a line that continues one of the window before or after, where
-`detect_db` is higher.
+"""Level over the noise floor at which a line is found that continues a line of the window before or
+after it. It matters only if it is below `detect_db`.
 """
 CONTINUES_MPS2 = 3.0
-"""Change of a line's speed from a window to the next, over their distance: cars speed up and brake
-by as much.
-"""
+"""Largest acceleration of a line from one window to the next: that of cars that speed up or brake."""
 STAYS_DB = 6.0
-"""Level over its surroundings from which a line that stays is taken out of windows."""
+"""Level over the speeds around it above which a constant line is attenuated."""
 ENOUGH = 20
 """Least number of windows with which a constant line can be told from a target."""
 BETWEEN_SHARE = 0.25
@@ -87,32 +85,31 @@ def noise_floor(power: np.ndarray, step_mps: float) -> np.ndarray:
     """
     quiet = _quiet(power)
     smooth = median_filter(quiet, 2 * round(FLOOR_MPS / step_mps) + 1, mode="nearest")
-    return (
-        smooth
-        if len(power) < ENOUGH
-        else np.maximum(smooth, maximum_filter(quiet, 3, mode="nearest"))
-    )
+    if len(power) < ENOUGH:
+        return smooth
+    return np.maximum(smooth, maximum_filter(quiet, 3, mode="nearest"))
 
 
 def without_hum(intervals: np.ndarray, twin: Twin) -> np.ndarray:
-    """Return intervals (n, symbols) of one recording with the lines that stay in nine tenths of
-    them or more brought down to what is around them; as they are where targets may hover, or where
-    there are fewer than `ENOUGH`.
+    """Return intervals (n, symbols) of one recording with constant lines attenuated.
 
-    What a receiver hums draws lines beside a weak target, and a network takes them for limbs.
+    A line that is present in at least nine tenths of the intervals is attenuated to the level of
+    the speeds around it, because a network takes the hum of a receiver for a weak target's limbs.
+    The intervals are returned unchanged if targets of this radar may hover, since their lines are
+    constant as well, or if there are fewer than `ENOUGH`.
     """
     count = intervals.shape[1]
     if not twin.slowest_mps or len(intervals) < ENOUGH:
         return intervals
     cells, speeds = _shown(count, twin)
-    places = cells[_may_have(speeds, twin)]
+    heard = cells[_may_have(speeds, twin)]
     spectra = np.fft.fft(intervals, axis=1)
-    quiet = _quiet(np.abs(spectra[:, places]) ** 2)
+    quiet = _quiet(np.abs(spectra[:, heard]) ** 2)
     step_mps = 2 * twin.edge_mps / count
     around = median_filter(quiet, 2 * round(FLOOR_MPS / step_mps) + 1, mode="nearest")
     over = maximum_filter(quiet, 3, mode="nearest") / np.maximum(around, 1e-300)
     stays = over > 10 ** (STAYS_DB / 10)
-    spectra[:, places[stays]] /= np.sqrt(over[stays])
+    spectra[:, heard[stays]] /= np.sqrt(over[stays])
     return np.fft.ifft(spectra, axis=1)
 
 
@@ -129,8 +126,8 @@ def floor_between(power: np.ndarray) -> np.ndarray:
     reach = max(round(AROUND * count), 1)
     wrapped = np.concatenate([power[:, -reach:], power, power[:, :reach]], axis=1)
     least = [
-        np.quantile(wrapped[:, place : place + 2 * reach + 1], BETWEEN_SHARE)
-        for place in range(count)
+        np.quantile(wrapped[:, first : first + 2 * reach + 1], BETWEEN_SHARE)
+        for first in range(count)
     ]
     return np.array(least) / -math.log(1 - BETWEEN_SHARE)
 
@@ -194,12 +191,8 @@ def present(intervals: np.ndarray, twin: Twin, noise: np.ndarray | None = None) 
         reach = round(CONTINUES_MPS2 * window_s / step_mps)
         return _continued(power[:, heard] / floor, level, weaker, reach)
     if noise is not None:
-        return (
-            over(
-                np.maximum(floor_between(quiet), maximum_filter(quiet.mean(axis=0), 3, mode="wrap"))
-            )
-            >= level
-        )
+        of_noise = maximum_filter(quiet.mean(axis=0), 3, mode="wrap")
+        return over(np.maximum(floor_between(quiet), of_noise)) >= level
     found = over(floor_between(quiet)) >= level
     if len(power) >= ENOUGH:
         passing = over(noise_floor(quiet, step_mps))
@@ -235,14 +228,14 @@ def beyond_mps(values: np.ndarray, rate_hz: float, twin: Twin, count: int) -> np
     is interference, such as a spur of the receiver, and counts only where it stands as much above
     that, too.
     """
-    long = twin.symbols * twin.symbol_interval_s * rate_hz
-    length = min(math.floor(long), len(values))
-    starts = np.minimum(np.rint(np.arange(count) * long).astype(int), len(values) - length)
-    cut = values[starts[:, None] + np.arange(length)]
-    power = (
-        np.abs(np.fft.fft((cut - cut.mean(axis=1, keepdims=True)) * np.hanning(length), axis=1))
-        ** 2
+    window_samples = twin.symbols * twin.symbol_interval_s * rate_hz
+    length = min(math.floor(window_samples), len(values))
+    starts = np.minimum(
+        np.rint(np.arange(count) * window_samples).astype(int), len(values) - length
     )
+    cut = values[starts[:, None] + np.arange(length)]
+    centred = cut - cut.mean(axis=1, keepdims=True)
+    power = np.abs(np.fft.fft(centred * np.hanning(length), axis=1)) ** 2
     cells = np.abs(np.fft.fftfreq(length, 1 / length))
     speeds = cells * rate_hz / length * SPEED_OF_LIGHT / twin.carrier_hz / 2
     level = 10 ** (BEYOND_DB / 10)

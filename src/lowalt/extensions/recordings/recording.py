@@ -61,7 +61,8 @@ def add_to(commands: argparse._SubParsersAction, name: str) -> None:
         type=Path,
         help=(
             "record to write, in the recording's folder or above (default: the file's name and "
-            ".yaml, here, or beside a recording that lies elsewhere)"
+            ".yaml, in the working directory if the recording lies below it, else next to the "
+            "recording)"
         ),
     )
     meaning = (
@@ -185,8 +186,10 @@ def _next(inspection: FileInspection, seen: Seen, out: Path) -> str:
 
 
 def _draft_path(recording: Path) -> Path:
-    """Return where the record of a recording goes: here if the recording lies here or below, else
-    beside it, since a record names no file outside of its folder.
+    """Return the path of the record that is drafted for a recording.
+
+    It lies in the working directory if the recording lies there or below, else next to the
+    recording, because a record may not name a file outside of its own folder.
     """
     name = f"{recording.stem}.yaml"
     real = recording.resolve()
