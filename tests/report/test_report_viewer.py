@@ -23,6 +23,7 @@ from lowalt.recognition.distances import cycle_s, still_row
 from lowalt.report import viewer, viewer_echoes, viewer_truth
 from lowalt.report.page import assembled, rendered
 from lowalt.report.sections import sample_viewer
+from lowalt.scene.view import ways_by
 from lowalt.shards import ShardSet
 from lowalt.shards.sample_record import record, sample_key
 from pages import browsed, narrow, sound
@@ -108,7 +109,8 @@ def test_the_truth_of_a_rotor_spreads_as_far_as_its_tips_move():
     times_s = np.linspace(0, 1 / moving["rate_hz"], 400)
     station = network.stations[1]
     speeds = viewer_truth.speeds_mps(cloud, moving, station, times_s)
-    ranges = viewer_truth.ranges_m(positions(cloud, moving, times_s), station)
+    ways = positions(cloud, moving, times_s) - np.asarray(station.position_m)
+    ranges = np.linalg.norm(ways, axis=-1)
     # The slope of the range, by differences over the cycle's four hundredth.
     slopes = np.gradient(ranges, times_s, axis=0)
     assert abs(speeds - slopes)[1:-1].max() < 2e-3 * abs(speeds).max()
@@ -118,8 +120,9 @@ def test_the_truth_of_a_rotor_spreads_as_far_as_its_tips_move():
 def test_a_link_s_range_is_the_mean_over_its_ends():
     sender = SimpleNamespace(position_m=(0.0, 0.0, 0.0), transmitter=None)
     link = SimpleNamespace(position_m=(10.0, 0.0, 0.0), transmitter=sender)
-    assert viewer_truth.ranges_m(np.array([4.0, 0.0, 0.0]), sender) == 4
-    assert viewer_truth.ranges_m(np.array([4.0, 0.0, 0.0]), link) == (4 + 6) / 2
+    point = np.array([4.0, 0.0, 0.0])
+    assert ways_by(sender, point) / 2 == 4
+    assert ways_by(link, point) / 2 == (4 + 6) / 2
 
 
 def test_probabilities_are_those_of_the_first_seed_of_each_scheme(tmp_path):

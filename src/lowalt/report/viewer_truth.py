@@ -12,6 +12,8 @@ from PIL import Image
 from lowalt.config.network import Network, Station
 from lowalt.motion import positions
 from lowalt.report.figures.style import embedded
+from lowalt.scene.truth import STEP_S
+from lowalt.scene.view import ways_by
 from lowalt.targets.cloud import Cloud
 
 COLUMNS = 200
@@ -24,8 +26,6 @@ GOLDEN_DEG = 67
 LIGHTNESS = 0.5
 SATURATION = 0.75
 """Of the colours of all parts but the body (0 to 1): they stand out on white and on black."""
-STEP_S = 1e-6
-"""Half the time over which speeds are taken: rotors turn far between two symbols."""
 
 
 def colours(cloud: Cloud) -> list[tuple[int, int, int]]:
@@ -41,30 +41,24 @@ def colours(cloud: Cloud) -> list[tuple[int, int, int]]:
     return found
 
 
-def ranges_m(places: np.ndarray, station: Station) -> np.ndarray:
-    """Return the range (...) m of places (..., 3) m, on a link half the way over its two ends."""
-    ends: list = [station]
-    if station.transmitter is not None:
-        ends.append(station.transmitter)
-    ways = [np.linalg.norm(places - np.asarray(end.position_m), axis=-1) for end in ends]
-    return np.mean(ways, axis=0)
-
-
 def speeds_mps(cloud: Cloud, row: dict, station: Station, times_s: np.ndarray) -> np.ndarray:
     """Return the radial speed (N, L) m/s of each point at times_s (N,), not folded.
 
-    It is positive away from the station.
+    It is positive away from the station. Rotors turn far between two symbols, so the speed is taken
+    over twice STEP_S.
     """
-    before = ranges_m(positions(cloud, row, times_s - STEP_S), station)
-    after = ranges_m(positions(cloud, row, times_s + STEP_S), station)
-    return (after - before) / (2 * STEP_S)
+    before = ways_by(station, positions(cloud, row, times_s - STEP_S))
+    after = ways_by(station, positions(cloud, row, times_s + STEP_S))
+    # Ways are there and back.
+    return (after - before) / (4 * STEP_S)
 
 
 def truth(cloud: Cloud, row: dict, network: Network, points: np.ndarray) -> list[str]:
     """Return a picture per station of the folded radial speeds of `points` (numbers) of a cloud.
 
-    Each is an embedded PNG without a background. Columns: the look from left to right; rows: from the largest speed at the top down to its
-    negative; colours: of the points' parts, the body above the others.
+    Each is an embedded PNG without a background. Its columns are the instants of the look, its rows
+    the speeds from the largest at the top down to its negative. A point has the colour of its part;
+    the body is drawn over the others.
     """
     look_s = network.symbols * network.symbol_interval_s
     times_s = (np.arange(COLUMNS) + 0.5) / COLUMNS * look_s

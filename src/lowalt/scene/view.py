@@ -156,6 +156,21 @@ def _stood(station: Station, place_m: np.ndarray) -> Station:
     return replace(station, position_m=(x, y, z))
 
 
+def masts_of(station: Station) -> tuple[np.ndarray, np.ndarray]:
+    """Return the positions of a station's sender and receiver, (3,) m each.
+
+    They differ on a link only.
+    """
+    sender = station.transmitter or station
+    return np.asarray(sender.position_m), np.asarray(station.position_m)
+
+
+def ways_by(station: Station, places: np.ndarray) -> np.ndarray:
+    """Return the way from a station's sender by places (..., 3) m to its receiver, (...) m."""
+    sender_m, receiver_m = masts_of(station)
+    return portable.norm(places - sender_m) + portable.norm(places - receiver_m)
+
+
 @dataclass(frozen=True, eq=False)
 class View:
     """A target's motion as one station sees it."""
@@ -215,13 +230,11 @@ class View:
     @property
     def masts_m(self) -> tuple[np.ndarray, np.ndarray]:
         """Places of the sender and the receiver, (3,) m each; those of a station are one."""
-        sender = self.station.transmitter or self.station
-        return np.asarray(sender.position_m), np.asarray(self.station.position_m)
+        return masts_of(self.station)
 
     def ways_m(self, places: np.ndarray) -> np.ndarray:
         """Return the way from the sender by places (..., 3) m to the receiver, (...) m."""
-        sender_m, receiver_m = self.masts_m
-        return portable.norm(places - sender_m) + portable.norm(places - receiver_m)
+        return ways_by(self.station, places)
 
     def relative_gain(self, images: np.ndarray) -> np.ndarray | float:
         """Return the element's amplitude gain toward images (N, L, 3), over that toward the points.
