@@ -95,6 +95,8 @@ def without_hum(intervals: np.ndarray, twin: Twin) -> np.ndarray:
 
     A line that is present in at least nine tenths of the intervals is attenuated to the level of
     the speeds around it, because a network takes the hum of a receiver for a weak target's limbs.
+    Its level is estimated as that of noise, which is ten times too much for a line that does not
+    vary; such a line then lies 10 dB below the speeds around it.
     The intervals are returned unchanged if targets of this radar may hover, since their lines are
     constant as well, or if there are fewer than `ENOUGH`.
     """
