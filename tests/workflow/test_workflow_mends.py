@@ -63,10 +63,13 @@ def test_the_lock_of_a_killed_run_stays_in_plain_snakemake(tmp_path):
 JOB = """
 import os, time
 from pathlib import Path
-from lowalt.machine.run_pipe import end_with_starter
-end_with_starter()
-Path("job.pid").write_text(str(os.getpid()))
-time.sleep(60)
+from lowalt.config.command import run
+
+def main(arguments):
+    Path("job.pid").write_text(str(os.getpid()))
+    time.sleep(60)
+
+run(main)
 """
 KILLED_WITH_A_JOB = """
 {mend}
