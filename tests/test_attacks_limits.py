@@ -137,3 +137,37 @@ def test_a_process_ends_with_its_starter_where_it_has_its_pipe(handed):
     assert lives(job) is not handed
     if not handed:
         os.kill(job, signal.SIGKILL)
+
+
+WORKERS = """
+import os, time
+from lowalt.machine.run_pipe import end_with_starter
+from lowalt.machine.side_by_side import together
+
+def work():
+    print(os.getpid(), flush=True)
+    time.sleep(60)
+
+end_with_starter()
+together([work, work], 2)
+"""
+
+
+def test_workers_of_a_job_end_with_the_job_s_starter():
+    starter = subprocess.Popen(
+        [sys.executable, "-c", STARTER.format(job=WORKERS, handed=1)],
+        stdout=subprocess.PIPE,
+        text=True,
+        env=os.environ | {"PYTHONPATH": str(ROOT / "src"), PIPE: ""},
+    )
+    job, *workers = [int(starter.stdout.readline()) for _ in range(3)]
+    assert lives(job) and all(map(lives, workers))
+    starter.send_signal(signal.SIGKILL)
+    starter.wait()
+    stop = time.monotonic() + 10
+    while any(map(lives, [job, *workers])) and time.monotonic() < stop:
+        time.sleep(0.02)
+    still = [process for process in workers if lives(process)]
+    for process in still:
+        os.kill(process, signal.SIGKILL)
+    assert not still
