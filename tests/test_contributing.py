@@ -23,6 +23,7 @@ SOURCE = "T. Schenk, RF Imperfections in High-rate Wireless Systems, Springer 20
 DEFAULTS = {"share": 0.5}
 IDLE = [{"share": 0}]
 
+
 def receive(settings: dict, samples: np.ndarray, look: Look, rng: np.random.Generator) -> np.ndarray:
     """Return the samples (N, M) plus `share` times their largest value."""
     return samples + settings["share"] * np.abs(samples).max()
@@ -33,6 +34,7 @@ ENTRY = """      dc_offset:
         additionalProperties: false
         properties: {share: {description: "constant over the largest sample", type: number, minimum: 0, maximum: 1}}
 """
+
 
 SPECTRUM = '''"""Power: the mean power of a window, the same in every row. For trying out a new spectrum."""
 
@@ -47,6 +49,7 @@ SOURCE = "any textbook, ch. 3"
 SIGNED = True
 ZERO_FIRST = False
 
+
 @dataclass(frozen=True)
 class Settings:
     """`window` and `hop` in symbols."""
@@ -54,24 +57,30 @@ class Settings:
     window: int
     hop: int
 
+
 DEFAULTS = Settings(32, 1)
+
 
 def rows(settings):
     """Return the number of rows."""
     return 16
 
+
 def speeds(settings, frequency_hz, symbol_interval_s):
     """Return the speeds of the first and the last row."""
     return -1.0, 1.0
+
 
 def definition(signals, settings, name, frequency_hz, symbol_interval_s):
     """Return the power of every window, (..., symbols) -> (..., 16, windows)."""
     power = np.mean(abs(segments(signals, settings.window, settings.hop, name)) ** 2, axis=-1)
     return np.repeat(power[..., None, :], 16, axis=-2)
 
+
 def tables(settings, frequency_hz, symbol_interval_s):
     """Return no tables."""
     return ()
+
 
 def fill(re, im, settings, tables, out):
     """Fill out (16, starts) float32."""
@@ -125,12 +134,14 @@ explanation.PLACES = {"dc_offset": PLACES["dc_offset"]}
 main(["explain", "scene.yaml", "--sample", "Crow:0", "--sources"])
 """
 
+
 def enter(folder: Path, before: str, entry: str) -> None:
     """Write an entry into the schema of a copy of the tree, before the line `before`."""
     schema = folder / "workflow/schemas/config.schema.yaml"
     text = schema.read_text()
     assert text.count(before) == 1
     schema.write_text(text.replace(before, entry + before))
+
 
 @pytest.fixture(scope="module")
 def lines(tmp_path_factory):
@@ -153,6 +164,7 @@ def lines(tmp_path_factory):
     assert run.returncode == 0, run.stderr
     return run.stdout.splitlines()
 
+
 def test_one_new_file_and_its_schema_entry_add_an_effect_that_is_run_documented_and_priced(lines):
     # Run: the signal is another. Priced: its milliseconds. Documented: its source.
     line, source = [line for line in lines if line.startswith("dc_offset")]
@@ -161,6 +173,7 @@ def test_one_new_file_and_its_schema_entry_add_an_effect_that_is_run_documented_
     # Its place in the chain is the last of the receiver's, before detection begins.
     names = json.loads(lines[0])
     assert names.index("adc") + 1 == names.index("dc_offset") == names.index("canceller") - 1
+
 
 def test_one_new_file_and_its_schema_entry_add_a_spectrum_that_is_run_documented_and_priced(lines):
     pattern = (
@@ -177,12 +190,14 @@ def test_one_new_file_and_its_schema_entry_add_a_spectrum_that_is_run_documented
     assert found["zeros"] == [0, 128, 0, 128]
     assert found["mean"] < 0.02
 
+
 # The page of fates names what is gone, that of words has a test of its own.
 DESIGN = sorted(
     f"design/{path.name}"
     for path in (ROOT / "design").glob("*.md")
     if path.stem not in ("fates", "words")
 )
+
 
 @pytest.mark.parametrize("name", ["CONTRIBUTING.md", "README.md", *DESIGN])
 def test_every_path_and_module_that_a_document_names_exists(name):
@@ -208,6 +223,7 @@ def test_every_path_and_module_that_a_document_names_exists(name):
     assert not missing
     assert paths or modules
 
+
 def test_every_name_in_the_list_of_words_stands_in_the_code():
     source = "\n".join(path.read_text() for path in (ROOT / "src").rglob("*.py"))
     known = set(re.findall(r"[A-Za-z_]\w+", source + (ROOT / "config/default.yaml").read_text()))
@@ -226,7 +242,9 @@ def test_every_name_in_the_list_of_words_stands_in_the_code():
     assert len(rows) > 30 and len(named) > 30
     assert not named - known - {"py", "RUN"}
 
+
 PACKAGE = ROOT / "src/lowalt"
+
 
 def test_every_folder_is_described_once_with_files_to_begin_with():
     text = (ROOT / "CONTRIBUTING.md").read_text()
@@ -243,6 +261,7 @@ def test_every_folder_is_described_once_with_files_to_begin_with():
     described = set(re.findall(r"^\| (`\w+/`.*?) \|", text, re.MULTILINE))
     named = {name for cell in described for name in re.findall(r"`(\w+)/`", cell)}
     assert named >= tracked - {"src", "build", "site", "wheels", "notebooks", "logs"}
+
 
 def test_names_in_brackets_after_a_path_stand_in_that_file():
     named = [
