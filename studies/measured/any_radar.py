@@ -10,7 +10,7 @@ channel; rows that a radar does not hear are zero.
 
 The table measured-any-radar.csv has, of every labelled window of the recordings, how many are named
 right, with the columns of measured-accuracy.csv and next to them what the radar's own network says
-of the same files. The rows of radar "any" resample the radars first, then their files.
+of the same files. The rows of radar "any" hold all radars that have an own network.
 """
 
 import argparse
@@ -353,9 +353,9 @@ def views_of(block: dict) -> list[View]:
     return [View(**view) for view in block["views"]]
 
 
-def together(rows: list[list]) -> list[list]:
-    """Return rows of `RECOGNITION` as those of one radar, `NAME`, after the rows themselves."""
-    return rows + [[NAME, *row[1:]] for row in rows]
+def together(rows: list[list], radars: set[str]) -> list[list]:
+    """Return rows of `RECOGNITION`, and after them those of some radars as of one, `NAME`."""
+    return rows + [[NAME, *row[1:]] for row in rows if row[0] in radars]
 
 
 def own_rows(path: Path) -> list[list]:
@@ -368,15 +368,18 @@ def own_rows(path: Path) -> list[list]:
 
 
 def compared(rows: list[list], own: list[list], seed: int) -> list[list]:
-    """Return the rows of `COLUMNS`: the accuracy of this network, and of each radar's own."""
+    """Return the rows of `COLUMNS`: the accuracy of this network, and of each radar's own. The rows
+    of `NAME` hold the radars that have one."""
     places = [ACCURACY.index(key) for key in OWN]
+    with_own = {row[0] for row in own}
     of_own = {
         tuple(row[:3]): [row[place] for place in places]
-        for row in accuracy_rows(together(own), seed)
+        for row in accuracy_rows(together(own, with_own), seed)
     }
     nothing = [math.nan] * len(OWN)
     return [
-        [*row, *of_own.get(tuple(row[:3]), nothing)] for row in accuracy_rows(together(rows), seed)
+        [*row, *of_own.get(tuple(row[:3]), nothing)]
+        for row in accuracy_rows(together(rows, with_own), seed)
     ]
 
 
