@@ -313,6 +313,21 @@ def test_an_array_of_hdf5_is_named_by_its_path(tmp_path):
         read(entry(tmp_path, "b.hdf5"))
 
 
+@pytest.mark.parametrize("points", [1, 4])
+def test_frames_of_sweeps_are_refused_and_their_sweeps_along_one_axis_are_read(tmp_path, points):
+    h5py = pytest.importorskip("h5py")
+    sweeps = np.repeat(wave(3456)[:, None], points, axis=1)
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["frames"] = sweeps.reshape(27, 128, points)
+        file["sweeps"] = sweeps
+    with pytest.raises(
+        InputError, match=rf"array complex128 \(27, 128, {points}\), frames of sweeps"
+    ):
+        read(entry(tmp_path, "a.h5", variable="frames", columns=[0]))
+    found = read(entry(tmp_path, "a.h5", variable="sweeps", columns=[0]))
+    np.testing.assert_array_equal(found.values, sweeps[:, 0])
+
+
 def chirps_of(count: int = 200, samples: int = 32) -> np.ndarray:
     """Chirps (count, samples) complex of a moving target and of a wall.
 

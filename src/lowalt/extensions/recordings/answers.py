@@ -1,5 +1,6 @@
 """What a network of a measured radar's twin says of every window of a recording."""
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -72,11 +73,18 @@ class Answers(NamedTuple):
         return said.get(outcome) or f"{100 * self.probabilities[number].max():6.2f} %  {outcome}"
 
 
-def answers(trained: Trained, settings: dict, record: Record, where: str) -> Answers:
+def answers(
+    trained: Trained,
+    settings: dict,
+    record: Record,
+    where: str,
+    images_of: Callable[[np.ndarray, Twin, Images, int], np.ndarray] | None = None,
+) -> Answers:
     """Return what a network says of every window of a recording.
 
     settings: how the network's images are made of signals (`runs.opened`), with the block `radar`;
-    where: the record's path. Raises: InputError where the network knows no recordings, the
+    where: the record's path; images_of: makes them in place of `rendered`, as that
+    does. Raises: InputError where the network knows no recordings, the
     recording's carrier or channel is not the radar's, or the file cannot be read.
     """
     known = radars()
@@ -103,7 +111,8 @@ def answers(trained: Trained, settings: dict, record: Record, where: str) -> Ans
     there = ~(found.clipped | found.lost)
     shown = intervals.copy()
     shown[there] = without_hum(intervals[there], twin)
-    images = rendered(shown, twin, Images.from_settings(settings["images"]), trained.size)
+    images_of = images_of or rendered
+    images = images_of(shown, twin, Images.from_settings(settings["images"]), trained.size)
     count = len(intervals)
     numbers = np.arange(len(intervals))
     samples = Windows(

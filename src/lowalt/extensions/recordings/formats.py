@@ -34,6 +34,8 @@ MOST_RECORDING_BYTES = 1 << 30
 """Largest size of a file; the bytes of a sample become sixteen."""
 MOST_COLUMNS = 10_000
 """Largest number of columns of a file; a table may have a chirp a row."""
+FEWEST_SWEEPS = 16
+"""Length from which two axes of an array of three are frames and the sweeps of each."""
 GAP_S = 0.05
 """Largest difference between the stated start of a SigMF capture and the one that its place in the
 samples gives.
@@ -83,9 +85,16 @@ class Table(NamedTuple):
 
 def _columns(values: np.ndarray, path: Path, record: Record) -> list[np.ndarray]:
     """Columns of an array: the longer axis is time. An array of chirps is one column."""
+    shape = np.shape(values)
     values = np.squeeze(np.asarray(values))
     if record.chirps and values.dtype.kind in "iufc" and values.size:
         return [in_chirps(values, record.chirps["samples"], str(path))]
+    if len(shape) > 2 and sum(length >= FEWEST_SWEEPS for length in shape) > 1:
+        # Nothing in the numbers says reliably whether time is lost between two frames.
+        raise InputError(
+            f"{path}: array {values.dtype} {shape}, frames of sweeps, expected an array with all"
+            " sweeps along one axis, from a radar that loses no time between frames"
+        )
     if values.dtype.kind not in "iufc" or not 1 <= values.ndim <= 2 or values.size == 0:
         raise InputError(
             f"{path}: array {values.dtype} {values.shape}, expected numbers in one or a few columns"

@@ -1,0 +1,113 @@
+"""One network for any radar: its axis means the same speeds at every radar, no drawn radar is a
+measured one, and its table stands next to what the radars' own networks say.
+"""
+
+from dataclasses import replace
+
+import any_radar
+import numpy as np
+import pytest
+import yaml
+from any_radar import View, alike, drawn_twin, image, rendered
+from scipy.io import wavfile
+
+from lowalt.config.network import SPEED_OF_LIGHT
+from lowalt.extensions.recordings.twin import Twin, radars
+from lowalt.files.csv_tables import read_csv
+from lowalt.files.yaml_files import load_yaml
+from lowalt.numerics.streams import stream
+
+SIZE = 32
+VIEW = View(0.1, 0.2, 60.0, "logarithmic")
+MILLIMETRES = Twin(77e9, "complex", 30e3, 1 / 15e3, 4500, "anti_aliased", 0.0, 12.0)
+
+
+def line(twin, speed_mps):
+    """An interval of a target at one radial speed."""
+    hertz = 2 * speed_mps * twin.carrier_hz / SPEED_OF_LIGHT
+    return np.exp(2j * np.pi * hertz * twin.symbol_interval_s * np.arange(twin.symbols))
+
+
+@pytest.mark.parametrize("speed_mps", [3.0, 5.0])
+def test_a_line_stands_in_the_row_of_its_speed_at_every_radar(speed_mps):
+    edges = VIEW.edges_mps(SIZE)
+    expected = SIZE - np.searchsorted(edges, speed_mps)
+    twins = [*radars().values(), MILLIMETRES]
+    for twin in twins:
+        found = image(line(twin, speed_mps), twin, VIEW, SIZE).argmax(axis=0)
+        # A transform of 0.1 s at 3.3 GHz has cells of half a metre per second.
+        assert np.abs(found - expected).max() <= 1
+        unheard = edges[:-1] >= 1.1 * twin.fastest_mps
+        picture = rendered(line(twin, speed_mps)[None], twin, [VIEW], 40.0, SIZE)[0, 0]
+        assert not picture[::-1][unheard].any() and picture.max() == 255
+
+
+def test_towards_and_away_look_alike_and_a_one_sided_line_beyond_the_edge_stays_at_its_speed():
+    away = image(line(MILLIMETRES, 4.0), MILLIMETRES, VIEW, SIZE)
+    towards = image(line(MILLIMETRES, -4.0), MILLIMETRES, VIEW, SIZE)
+    np.testing.assert_allclose(away, towards, rtol=1e-6, atol=1e-6 * away.max())
+    twin = radars()["cw_24ghz"]
+    assert twin.edge_mps < 14.0 < twin.fastest_mps
+    found = image(line(twin, 14.0), twin, VIEW, SIZE).argmax(axis=0)
+    assert (found == SIZE - np.searchsorted(VIEW.edges_mps(SIZE), 14.0)).all()
+
+
+def test_drawn_radars_lie_in_their_ranges_and_none_is_a_measured_one():
+    block = load_yaml(any_radar.SETTINGS)
+    measured = [*radars().values()]
+    drawn = [drawn_twin(block, measured, stream(1, "test", number)) for number in range(300)]
+    assert drawn[:3] == [drawn_twin(block, measured, stream(1, "test", k)) for k in range(3)]
+    carriers = np.array([twin.carrier_hz for twin in drawn])
+    assert 2e9 <= carriers.min() < 3e9 and 60e9 < carriers.max() <= 80e9
+    for twin in drawn:
+        assert Twin.from_settings(vars(twin)) == twin
+        assert 0.15 < twin.symbols * twin.symbol_interval_s < 0.61
+        assert not any(alike(twin, other, block["apart"]) for other in measured)
+    assert {(twin.channel, twin.sampling) for twin in drawn} == {
+        (channel, one) for channel, of in block["samplings"].items() for one in of
+    }
+    # A radar that is drawn as a measured one is drawn again.
+    first = drawn_twin(block, [], stream(1, "test", 0))
+    near = replace(first, carrier_hz=1.05 * first.carrier_hz)
+    again = drawn_twin(block, [near], stream(1, "test", 0))
+    assert alike(first, near, block["apart"]) and not alike(again, near, block["apart"])
+
+
+def test_the_table_has_each_labelled_recording_next_to_the_radar_s_own_network(tmp_path):
+    """Networks of two steps: what they say is of no use, where it stands is."""
+    folder = tmp_path / "inputs/walker_24ghz"
+    folder.mkdir(parents=True)
+    rate = 6000
+    time = np.arange(5 * rate) / rate
+    wave = np.cos(2 * np.pi * 2 * 3.0 * 24e9 / SPEED_OF_LIGHT * time) * (time > 1)
+    noise = np.random.default_rng(0).standard_normal(len(time))
+    tone = (20000 * (0.2 * wave + 0.01 * noise)).astype(np.int16)
+    wavfile.write(folder / "PCM2900_Best_Walking_Data.wav", rate, tone)
+    block = load_yaml(any_radar.SETTINGS)
+    block |= {"radars": {"train": 2, "validation": 1, "test": 1}, "echoes": 1, "receivers": 1}
+    block |= {"carrier_hz": [8e9, 10e9], "fastest_mps": [8.0, 9.0], "symbols": [200, 500]}
+    block["recognition"] |= {
+        "seeds": [0, 1],
+        "training": {"steps": 2, "batch": 4, "validate_every": 1},
+    }
+    (tmp_path / "settings.yaml").write_text(yaml.safe_dump(block))
+    options = {
+        "inputs": tmp_path / "inputs",
+        "out": tmp_path / "out",
+        "models": tmp_path / "models",
+        "settings": tmp_path / "settings.yaml",
+    }
+    any_radar.main([word for key, path in options.items() for word in (f"--{key}", str(path))])
+    rows = read_csv(tmp_path / "out/measured-any-radar.csv", *any_radar.COLUMNS)
+    assert [(row["radar"], row["half"], row["class"]) for row in rows] == [
+        (radar, "tuning", "Pedestrian") for radar in ("cw_24ghz", "any")
+    ]
+    assert {row["windows"] for row in rows} == {"12"}
+    kept = read_csv("results/reference/measured-accuracy.csv")
+    own = [row for row in kept if (row["radar"], row["half"]) == ("cw_24ghz", "tuning")]
+    of_class = next(row for row in own if row["class"] == "Pedestrian")
+    for key in ("right_percent", "low", "named_percent"):
+        # The kept cells of each file are rounded as well.
+        assert float(rows[0][f"own_{key}"]) == pytest.approx(float(of_class[key]), rel=1e-4)
+    simulated = read_csv(tmp_path / "out/any-radar-simulated.csv", *any_radar.SIMULATED)
+    assert len(simulated) == 8 and {row["windows"] for row in simulated} == {"1"}
