@@ -6,6 +6,7 @@ import math
 import pytest
 
 import kept_records
+from lowalt.files import yaml_files
 from lowalt.targets import records
 from meshes import write_bird, write_quad
 from skips import Skips
@@ -38,6 +39,7 @@ LONG = (
 
 
 records.merge = kept_records.once(records.merge)
+yaml_files._parsed = kept_records.once_of_repository(yaml_files._parsed)
 
 # Imports make millions of objects that stay: looking through them for garbage took a tenth of the
 # tests' time.

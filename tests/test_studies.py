@@ -65,9 +65,14 @@ def test_the_command_of_each_study_starts():
     programs = [
         start.format([str(Path(path).parent), *folders], [path, "--help"]) for path in paths
     ]
-    for path, (status, _, complaint) in zip(paths, ended(programs, "torch", "timm"), strict=True):
+    for path, (status, said, complaint) in zip(
+        paths, ended(programs, "torch", "timm"), strict=True
+    ):
         # A program with several commands names them, with exit status 2.
         assert status in (0, 2) and "Traceback" not in complaint, (path, complaint)
+        given = re.findall(r"study\.py(.*)", Path(path).with_name("Makefile").read_text())
+        options = set(re.findall(r"--[a-z-]+", " ".join(given)))
+        assert status == 2 or not [option for option in options if option not in said], path
     assert len(paths) > 5
 
 

@@ -75,7 +75,7 @@ def test_an_echo_that_sets_in_stands_at_half_its_strength_at_that_time_on_the_ax
 
 
 def test_sample_writes_the_bytes_of_the_data_set_and_a_picture(tmp_path, capsys):
-    assert main(["sample", "Crow", "3", "--snr", "13", "--out", str(tmp_path)]) == 0
+    assert main(f"sample Crow 3 --snr 13 --out {tmp_path}".split()) == 0
     said = capsys.readouterr().out.split()
     stem = "crow-000003-snr013"
     assert [Path(path).name for path in said] == [

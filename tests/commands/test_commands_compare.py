@@ -13,7 +13,7 @@ from run_folders import run_folder
 def test_compare_says_what_differs_and_by_how_much(tmp_path, capsys):
     one = run_folder(tmp_path / "one", 80, 5.0)
     other = run_folder(tmp_path / "other", 81, 2.5, seed=2)
-    assert main(["compare", str(one), str(other), "--json"]) == 0
+    assert main(f"compare {one} {other} --json".split()) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["configuration"] == {"run": ["one", "other"], "seed": [1, 2]}
     assert found["accuracy_percent"] == {"seen A:VT": [81.0, 82.0]}

@@ -127,7 +127,7 @@ def test_a_recording_beside_its_record_or_below_is_read(recordings, name):
 
 def test_a_draft_stands_where_it_may_name_its_recording(recordings, capsys):
     secret = recordings.parent / "secret"
-    asked = ["recording", "inspect", f"{secret}/walk.npy", "--carrier", "24e9", "--rate", "12000"]
+    asked = f"recording inspect {secret}/walk.npy --carrier 24e9 --rate 12000".split()
     assert main([*asked, "--out", "mine.yaml"]) == 2
     assert "expected a record in the recording's folder or above" in capsys.readouterr().err
     assert main(asked) == 0

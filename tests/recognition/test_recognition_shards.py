@@ -168,14 +168,7 @@ def test_predicting_from_a_signal_and_from_its_tile_agree_with_the_network(
 
 
 def test_scores_come_from_the_shards_labels_not_from_the_file(dataset, model, tmp_path):
-    arguments = [
-        "--index",
-        str(dataset / "index.json"),
-        "--model",
-        str(model),
-        "--out",
-        str(tmp_path / "p.csv"),
-    ]
+    arguments = f"--index {dataset}/index.json --model {model} --out {tmp_path}/p.csv".split()
     settings = json.dumps({"batch": 4, "threads": 1, "precision": "fp32", "mirror": False})
     main(["evaluate", "--settings", settings, *arguments])
     ours = predictions.read(tmp_path / "p.csv").of(folds("seen", "test"))
@@ -285,14 +278,9 @@ def test_reduced_images_of_another_size_chunk_or_snr_are_refused_by_name(dataset
     options = reduce_tiles(dataset, tmp_path, "seen", (24,))[24]
     other = reduce_tiles(dataset, tmp_path, "unseen", (24,))[24]
     mixed = [*other[:2], *options[2:]]
-    same = [
-        "--index",
-        str(dataset / "index.json"),
-        "--shard",
-        "seen-train-00000.tar",
-        "--out",
-        str(tmp_path / "x.npz"),
-    ]
+    same = (
+        f"--index {dataset}/index.json --shard seen-train-00000.tar --out {tmp_path}/x.npz".split()
+    )
     for size, levels, given, words in (
         (32, SNRS, options, r"seen-24\.npy: uint8 .* expected uint8 \(16, views, 32, 32\)"),
         (24, SNRS, mixed, r"unseen-24\.npy"),

@@ -373,23 +373,13 @@ def test_the_final_weights_are_those_validated_last_of_the_best(monkeypatch, vie
 @pytest.mark.parametrize(
     ("block", "change"),
     [
-        *(
-            ("training", change)
-            for change in (
-                {"steps": 0},
-                {"rate": -1.0},
-                {"precision": "fp16"},
-                {"warmup": 2},
-                {"epochs": 3},
-                {"batch": True},
-                {"ema": math.nan},
-                {"threads": 1.0},
-            )
-        ),
-        *(
-            ("augmentation", change)
-            for change in ({"mirror": 1.5}, {"mask_time": "0.1"}, {"flip": 1})
-        ),
+        ("training", {"steps": 0}),
+        ("training", {"precision": "fp16"}),
+        ("training", {"epochs": 3}),
+        ("training", {"batch": True}),
+        ("training", {"ema": math.nan}),
+        ("augmentation", {"mirror": 1.5}),
+        ("augmentation", {"mask_time": "0.1"}),
     ],
 )
 def test_wrong_settings_are_refused_by_name(views, tmp_path, block, change):

@@ -1,11 +1,15 @@
-"""What tests make again and again from equal records is made once per process: the checks of the
-forty shipped records, for which their models are built, and the clouds of data sets.
+"""What tests make again and again from equal records is made once per process: the values of the
+repository's own YAML files, the checks of the forty shipped records, for which their models are
+built, and the clouds of data sets.
 """
 
 import functools
 import pickle
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
+
+ROOT = Path(__file__).resolve().parents[2]
 
 
 def once(make: Callable[..., Any]) -> Callable[..., Any]:
@@ -40,3 +44,16 @@ def once_without_files(make: Callable[..., Any]) -> Callable[..., Any]:
         return (make if of_files else kept)(record, *sources)
 
     return made
+
+
+def once_of_repository(parse: Callable[[str, Any], Any]) -> Callable[[str, Any], Any]:
+    """As `once`, of a function of (text, path); a text of a file elsewhere is parsed anew."""
+    kept = once(parse)
+
+    @functools.wraps(parse)
+    def parsed(text: str, path: Any) -> Any:
+        """A copy of what was parsed, or of files of a test something new."""
+        of_repository = ROOT in Path(path).resolve().parents
+        return (kept if of_repository else parse)(text, path)
+
+    return parsed

@@ -118,21 +118,17 @@ def _levels(text: str) -> int:
     return deepest + text.count("[") + text.count("{")
 
 
-def load_yaml(path: str | Path, what: str = "configuration", holds: str = "keys") -> dict:
-    """Return the mapping in a YAML file.
+def _parsed(text: str, path: str | Path) -> object:
+    """Return the value that a text in YAML holds.
 
-    what, holds: the file and its entries in words, for messages. Raises: InputError naming the file
-    where it is missing, too large, not YAML, no mapping, a template, or has a key twice.
+    path: its file, for messages. Raises: as `load_yaml` for what is not YAML or too large.
     """
-    text = text_of(path, what, MOST_YAML_BYTES)
-    if text.count("\n") + text.count(",") > MOST_ENTRIES:
-        raise InputError(f"{path}: over {MOST_ENTRIES} lines and commas, expected a shorter {what}")
     try:
         loader = (_Loader if _levels(text) > DEEPEST else _FastLoader)(text)
         loader.name = str(path)
         root = loader.get_single_node()
         _check_size(root, path)
-        value = None if root is None else loader.construct_document(root)
+        return None if root is None else loader.construct_document(root)
     except InputError:
         raise
     # PyYAML also raises errors of its converters, such as for month 99 of a date or a number of
@@ -143,6 +139,18 @@ def load_yaml(path: str | Path, what: str = "configuration", holds: str = "keys"
         raise InputError(
             f"{path}: mappings and lists stand in each other too deeply, expected a few levels"
         ) from None
+
+
+def load_yaml(path: str | Path, what: str = "configuration", holds: str = "keys") -> dict:
+    """Return the mapping in a YAML file.
+
+    what, holds: the file and its entries in words, for messages. Raises: InputError naming the file
+    where it is missing, too large, not YAML, no mapping, a template, or has a key twice.
+    """
+    text = text_of(path, what, MOST_YAML_BYTES)
+    if text.count("\n") + text.count(",") > MOST_ENTRIES:
+        raise InputError(f"{path}: over {MOST_ENTRIES} lines and commas, expected a shorter {what}")
+    value = _parsed(text, path)
     if not isinstance(value, dict):
         raise InputError(f"{path}: {type(value).__name__}, expected a mapping of {holds}")
     if TEMPLATE in value:

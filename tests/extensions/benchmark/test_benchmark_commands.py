@@ -160,6 +160,13 @@ def test_make_compares_with_the_kept_checksums(small, monkeypatch, capsys, tmp_p
     assert main(["benchmark", "make"]) == 1
     assert f"main/motion/{table.name} is missing" in capsys.readouterr().out
     table.write_text(whole)
+    path = next(Path("results/lowalt-40-v1/noisy").glob("*.npy"))
+    signals = path.read_bytes()
+    last_bit = bytes([signals[-1] ^ 1])
+    path.write_bytes(signals[:-1] + last_bit)
+    assert main(["benchmark", "make"]) == 1
+    assert f"main/noisy/{path.name} differs" in capsys.readouterr().out
+    path.write_bytes(signals)
 
 
 def test_make_says_what_it_costs_and_makes_the_images_that_the_tracks_use(
@@ -202,23 +209,6 @@ def test_make_says_what_it_costs_and_makes_the_images_that_the_tracks_use(
     ):
         _ = benchmark.load("seen", "test").images
     kept.rename(missing)
-
-
-def test_make_reports_a_signal_that_differs_in_one_last_bit(small, monkeypatch, capsys, tmp_path):
-    monkeypatch.setattr(workflow, "ended", lambda options: {"status": 0})
-    monkeypatch.setattr(frozen_bytes, "REFERENCE", str(tmp_path))
-    monkeypatch.setattr(frozen_bytes, "PARTS", ("main",))
-    frozen_bytes.write("results", tmp_path)
-    path = next(Path("results/lowalt-40-v1/noisy").glob("*.npy"))
-    whole = np.load(path)
-    changed = whole.copy()
-    first = changed.view(np.float32).reshape(-1)
-    first[0] = np.nextafter(first[0], np.float32(np.inf))
-    np.save(path, changed)
-    assert (np.load(path) != whole).sum() == 1 and main(["benchmark", "make"]) == 1
-    assert f"main/noisy/{path.name} differs" in capsys.readouterr().out
-    np.save(path, whole)
-    assert main(["benchmark", "make"]) == 0
 
 
 def stating(path, track, **changed):
@@ -435,13 +425,3 @@ def test_the_study_trains_tests_and_writes_its_table(small, tmp_path, monkeypatc
     with pytest.raises(InputError, match=r"would lose the rows of .*, 1 in all"):
         kept_results.write_table(list(again.values())[1:], tmp_path)
     shutil.rmtree(tmp_path / "out")
-
-
-def test_the_study_says_what_it_takes(monkeypatch, capsys):
-    monkeypatch.syspath_prepend(ROOT / "studies")
-    monkeypatch.syspath_prepend(ROOT / "studies/benchmark")
-    path = str(ROOT / "studies/benchmark/study.py")
-    monkeypatch.setattr(sys, "argv", [path, "--help"])
-    with pytest.raises(SystemExit) as ended:
-        runpy.run_path(path, run_name="__main__")
-    assert ended.value.code == 0 and "--confirm" in capsys.readouterr().out

@@ -1,5 +1,6 @@
 """The benchmark's results beside a run: two methods compared, and its section of the report."""
 
+import functools
 import json
 from pathlib import Path
 from types import SimpleNamespace
@@ -9,7 +10,7 @@ import pytest
 
 from configured import stages_of
 from lowalt.__main__ import main
-from lowalt.extensions.benchmark import baseline_table, benchmark_results
+from lowalt.extensions.benchmark import baseline_table, benchmark_results, compared_methods
 from lowalt.files.csv_tables import read_csv
 from lowalt.report.inputs import FILES, Inputs
 from lowalt.report.page import added_sections, assembled
@@ -18,7 +19,10 @@ from pages import sound
 ROOT = Path(__file__).parents[3]
 
 
-def test_compare_holds_two_methods_of_the_benchmark_against_each_other(tmp_path, capsys):
+def test_compare_holds_two_methods_of_the_benchmark_against_each_other(monkeypatch, capsys):
+    # Facts and text come from the same numbers, which take seconds.
+    once = functools.cache(compared_methods.compared)
+    monkeypatch.setattr(compared_methods, "compared", once)
     first = "nearest centroid on moments"
     second = "majority class"
     assert main(["compare", first, second, "--json"]) == 0

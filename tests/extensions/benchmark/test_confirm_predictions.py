@@ -52,7 +52,7 @@ def own(tmp_path, monkeypatch):
 
 
 def test_the_test_set_follows_from_the_file_and_all_that_it_reads(own, capsys, monkeypatch):
-    assert main(["benchmark", "confirm", "--predict", str(own), "--track", "unseen", "--json"]) == 0
+    assert main(f"benchmark confirm --predict {own} --track unseen --json".split()) == 0
     printed = capsys.readouterr()
     found = json.loads(printed.out)
     assert "with your rights and at your own risk" in printed.err
@@ -138,8 +138,5 @@ def test_a_file_that_is_not_frozen_or_breaks_a_rule_is_refused(own, fault, monke
 
 def test_a_model_and_a_file_are_asked_for_one_at_a_time(own, capsys):
     assert main(["benchmark", "confirm", "--track", "unseen"]) == 2
-    assert (
-        main(["benchmark", "confirm", "default-unseen", "--predict", str(own), "--track", "unseen"])
-        == 2
-    )
+    assert main(f"benchmark confirm default-unseen --predict {own} --track unseen".split()) == 2
     assert "expected either a model or --predict FILE.py" in capsys.readouterr().err

@@ -43,6 +43,22 @@ CAR = [
     "2.85",
 ]
 SPEED = ["--speed", "18"]
+STATED_DRONE = {
+    "rotors": 6,
+    "diagonal": 1.13,
+    "propeller": 0.53,
+    "blades": 2,
+    "rate": (50.0, 120.0),
+    "speed": 18.0,
+}
+STATED_CAR = {
+    "length": 4.6,
+    "width": 1.85,
+    "height": 1.44,
+    "wheel": 0.67,
+    "wheel_base": 2.85,
+    "speed": 18.0,
+}
 
 
 def refusal(arguments, capsys):
@@ -106,14 +122,7 @@ def test_a_bird_and_a_vehicle_have_the_sheet_s_sizes(drafts, tmp_path):
 
 @pytest.mark.parametrize("frame", ["car", "bus"])
 def test_a_vehicle_rolls_on_the_wheel_of_its_sheet(frame):
-    stated = {
-        "length": 4.6,
-        "width": 1.85,
-        "height": 1.44,
-        "wheel": 0.69,
-        "wheel_base": 2.85,
-        "speed": 18.0,
-    }
+    stated = STATED_CAR | {"wheel": 0.69}
     cloud = drafted_cloud("vehicle", frame=frame, **stated)
     wheel = cloud.part == cloud.kinds.index("wheel")
     assert cloud.record["wheel_diameter_m"] == 0.69
@@ -153,16 +162,7 @@ def test_a_coaxial_frame_carries_two_rotors_on_each_arm_that_turn_against_each_o
 
 def test_what_the_sheet_does_not_say_grows_with_the_size(drafts, tmp_path):
     twice = [{"1.13": "2.26", "0.53": "1.06"}.get(word, word) for word in DRONE]
-    frame = [
-        "--frame",
-        "radial",
-        "--climb",
-        "3",
-        "--subtype",
-        "Twice",
-        "--out",
-        str(tmp_path / "twice.yaml"),
-    ]
+    frame = f"--frame radial --climb 3 --subtype Twice --out {tmp_path}/twice.yaml".split()
     assert main(["target", "drone", *twice, *SPEED, *frame]) == 0
     small = yaml.safe_load(drafts["drone"].read_text())["my-drone"]
     large = yaml.safe_load((tmp_path / "twice.yaml").read_text())["Twice"]
@@ -175,14 +175,7 @@ def test_what_the_sheet_does_not_say_grows_with_the_size(drafts, tmp_path):
 
 
 def test_python_drafts_the_same_record_and_refuses_what_a_sheet_lacks(drafts, tmp_path):
-    stated = {
-        "rotors": 6,
-        "diagonal": 1.13,
-        "propeller": 0.53,
-        "blades": 2,
-        "rate": (50.0, 120.0),
-        "speed": 18.0,
-    }
+    stated = STATED_DRONE
     text, lender = lowalt.draft_target("drone", subtype="my-drone", **stated)
     assert text == drafts["drone"].read_text() and lender in text
     assert (
@@ -239,14 +232,7 @@ def test_wrong_sheets_are_refused_in_words_of_the_command(tmp_path, capsys):
     ("diagonal", "lender"), [(1.13, "DJI Matrice 600 Pro"), (0.52, "Yuneec H520")]
 )
 def test_the_published_craft_nearest_in_size_lends_its_figures(diagonal, lender):
-    stated = {
-        "rotors": 6,
-        "diagonal": diagonal,
-        "propeller": 0.1,
-        "blades": 2,
-        "rate": (50.0, 120.0),
-        "speed": 18.0,
-    }
+    stated = STATED_DRONE | {"diagonal": diagonal, "propeller": 0.1}
     assert lowalt.draft_target("drone", **stated)[1] == lender
 
 
@@ -255,14 +241,7 @@ def test_the_published_craft_nearest_in_size_lends_its_figures(diagonal, lender)
     [("width", {"track", "tyre_width"}), ("height", {"ground_clearance"})],
 )
 def test_a_figure_of_a_vehicle_grows_with_its_own_side_alone(word, grown):
-    stated = {
-        "length": 4.6,
-        "width": 1.85,
-        "height": 1.44,
-        "wheel": 0.67,
-        "wheel_base": 2.0,
-        "speed": 18.0,
-    }
+    stated = STATED_CAR | {"wheel_base": 2.0}
     figures = []
     for factor in (1.0, 1.1):
         text, _ = lowalt.draft_target("vehicle", **(stated | {word: stated[word] * factor}))

@@ -50,7 +50,7 @@ def test_a_quadrotor_s_four_propellers_are_found_and_drafted(blades, unit, metre
         "rear right rotor",
     ]
     made = tmp_path / "own.npz"
-    assert main(["target", "make", str(out), "--inputs", str(tmp_path), "--out", str(made)]) == 0
+    assert main(f"target make {out} --inputs {tmp_path} --out {made}".split()) == 0
     cloud = read(made)
     factor = cloud.record["published"]["size_m"] / np.hypot(0.24, 0.2)
     # The file's x is the front, so its y is the left.
@@ -116,17 +116,7 @@ def test_a_bird_s_wings_are_drafted_where_its_body_ends(tmp_path):
     out = tmp_path / "bird.yaml"
     assert (
         main(
-            [
-                "target",
-                "new",
-                str(tmp_path / "bird.ply"),
-                "--subtype",
-                "Crow",
-                "--inputs",
-                str(tmp_path),
-                "--out",
-                str(out),
-            ]
+            f"target new {tmp_path}/bird.ply --subtype Crow --inputs {tmp_path} --out {out}".split()
         )
         == 0
     )
@@ -175,9 +165,7 @@ def test_a_car_without_wheels_is_asked_for_them_then_made_and_shown_with_a_warni
     )
     assert main([*command, "--out", str(out), "--wheels", "0"]) == 0
     with pytest.warns(InputWarning, match="0 wheels, expected at least 3"):
-        assert (
-            main(["target", "make", str(out), "--inputs", str(tmp_path), "--out", str(made)]) == 0
-        )
+        assert main(f"target make {out} --inputs {tmp_path} --out {made}".split()) == 0
     assert made.with_suffix(".png").exists() and read(made).kinds == ("body",)
 
 

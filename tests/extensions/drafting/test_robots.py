@@ -40,12 +40,7 @@ def made(path: Path, inputs: Path, *words: str) -> tuple[dict, Cloud]:
     assert (
         main(["target", "new", str(path), "--inputs", str(inputs), "--out", str(out), *words]) == 0
     )
-    assert (
-        main(
-            ["target", "make", str(out), "--inputs", str(inputs), "--out", str(inputs / "own.npz")]
-        )
-        == 0
-    )
+    assert main(f"target make {out} --inputs {inputs} --out {inputs}/own.npz".split()) == 0
     return yaml.safe_load(out.read_text()), read(inputs / "own.npz")
 
 
@@ -123,7 +118,7 @@ def test_an_sdf_s_includes_frames_and_joint_poses_are_followed(tmp_path):
         "0 0 5 0", "0 0 1.2 0"
     )
     (tmp_path / "top/top.sdf").write_text(at_its_hinge)
-    words = [str(tmp_path / "top/top.sdf"), "--inputs", str(tmp_path), "--out", str(tmp_path / "a")]
+    words = f"{tmp_path}/top/top.sdf --inputs {tmp_path} --out {tmp_path}/a".split()
     assert main(["target", "new", *words]) == 0
     parts = yaml.safe_load((tmp_path / "a").read_text())["top"]["parts"]
     assert parts["lift"]["sense"] == "cw"  # anticlockwise about an axis that points down
@@ -244,15 +239,7 @@ def test_a_plane_with_one_wheel_and_a_motor_is_asked_for_its_category_and_a_surf
     )
     path = tmp_path / "plane.urdf"
     path.write_text(f'<robot name="p">{base}{turning}</robot>')
-    words = [
-        "target",
-        "new",
-        str(path),
-        "--inputs",
-        str(tmp_path),
-        "--out",
-        str(tmp_path / "a.yaml"),
-    ]
+    words = f"target new {path} --inputs {tmp_path} --out {tmp_path}/a.yaml".split()
     assert main(words) == 2
     assert main([*words, "--category", "UAV"]) == 0
     assert list(yaml.safe_load((tmp_path / "a.yaml").read_text())["plane"]["parts"]) == [
@@ -304,15 +291,7 @@ def test_a_description_whose_names_tell_no_category_is_refused_until_it_is_given
 ):
     path = folder(tmp_path) / "craft/craft.urdf"
     path.write_text(urdf().replace("rotor_", name, -1 if name == "drum_" else 6))
-    command = [
-        "target",
-        "new",
-        str(path),
-        "--inputs",
-        str(tmp_path),
-        "--out",
-        str(tmp_path / "a.yaml"),
-    ]
+    command = f"target new {path} --inputs {tmp_path} --out {tmp_path}/a.yaml".split()
     assert main(command) == 2
     error = capsys.readouterr().err
     assert seen in error and "--category Vehicle" in error and error.count("\n") == 1
@@ -326,7 +305,7 @@ def test_a_description_whose_propellers_are_fixed_is_looked_at_like_a_mesh(
     inputs = folder(tmp_path)
     path = inputs / "craft/craft.urdf"
     path.write_text(urdf().replace("continuous", "fixed"))
-    command = ["target", "new", str(path), "--inputs", str(inputs), "--out"]
+    command = f"target new {path} --inputs {inputs} --out".split()
     assert main([*command, "named.yaml"]) == 0  # the links' names tell their number
     path.write_text(urdf().replace("continuous", "fixed").replace("rotor_", "disc_"))
     assert main([*command, "a.yaml"]) == 2

@@ -39,7 +39,7 @@ def drafted_town(folder):
     """The scene that `lowalt scene new` drafts from four buildings."""
     town = towns.geojson(folder / "town.geojson", towns.BOXES)
     scene = folder / "mytown.yaml"
-    assert main(["scene", "new", str(town), "--out", str(scene)]) == 0
+    assert main(f"scene new {town} --out {scene}".split()) == 0
     return scene
 
 

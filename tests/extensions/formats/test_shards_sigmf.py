@@ -42,7 +42,7 @@ def metadata(folder, station):
 
 
 def test_every_recording_tells_its_own_station(index, tmp_path):
-    main(["--index", str(index), "--out", str(tmp_path)])
+    main(f"--index {index} --out {tmp_path}".split())
     assert len(list(tmp_path.iterdir())) == 2 * 3
     for place, (name, station) in enumerate(NETWORK["stations"].items()):
         found = metadata(tmp_path, name)
@@ -64,7 +64,7 @@ def test_every_recording_tells_its_own_station(index, tmp_path):
 
 
 def test_every_annotation_is_its_own_sample_s_seen_from_the_recording_s_station(index, tmp_path):
-    main(["--index", str(index), "--out", str(tmp_path)])
+    main(f"--index {index} --out {tmp_path}".split())
     made = [row for group, fold in PARTS for row in motion_rows(group)[PARTS[group, fold]]]
     rows = {sample_key(row["subtype"], row["model"], 3.0): row for row in made}
     keys = [key.decode() for key in ShardSet(index).keys.tolist()]
@@ -98,7 +98,7 @@ def test_only_the_groups_and_folds_asked_for_are_exported(index, tmp_path):
 
 def test_recipe_shards_are_exported_as_the_signals_they_stand_for(tmp_path):
     folder = write_shards(tmp_path / "shards", "recipe")
-    main(["--index", str(folder / "index.json"), "--out", str(tmp_path / "sigmf")])
+    main(f"--index {folder}/index.json --out {tmp_path}/sigmf".split())
     shards = ShardSet(folder / "index.json")
     signals = np.stack([shards.signal(number) for number in range(len(shards))])
     for place, name in enumerate(NETWORK["stations"]):

@@ -104,7 +104,7 @@ def test_a_description_without_a_date_has_the_day_of_the_index(published):
     before = (published / "croissant.json").read_bytes()
     times = (published / "index.json").stat()
     os.utime(published / "index.json", (day, day))
-    card(["--index", str(published / "index.json"), "--config", str(folder / "config.yaml")])
+    card(f"--index {published}/index.json --config {folder}/config.yaml".split())
     assert json.loads((published / "croissant.json").read_text())["datePublished"] == "2025-03-04"
     os.utime(published / "index.json", (times.st_atime, times.st_mtime))
     (published / "croissant.json").write_bytes(before)
@@ -112,7 +112,7 @@ def test_a_description_without_a_date_has_the_day_of_the_index(published):
 
 def test_sigmf_recordings_hold_every_signal_with_its_annotation(published, tmp_path):
     shards = ShardSet(published / "index.json")
-    arguments = ["--index", str(published / "index.json"), "--out", str(tmp_path)]
+    arguments = f"--index {published}/index.json --out {tmp_path}".split()
     if shards.kind == "image":
         with pytest.raises(InputError, match="expected 'signal'"):
             sigmf(arguments)

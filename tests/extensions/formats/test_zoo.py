@@ -44,7 +44,7 @@ def test_an_entry_of_the_zoo_is_small_measured_and_predicts_by_name(
     finished, views, tmp_path, monkeypatch, capsys
 ):
     monkeypatch.chdir(tmp_path)
-    zoo.main(["--model", str(finished), "--views", str(views), "--name", "mine"])
+    zoo.main(f"--model {finished} --views {views} --name mine".split())
     content = model_file.read("results/zoo/mine.safetensors")
     exact, _ = runs.opened(finished)
     entry, _ = runs.opened("mine")

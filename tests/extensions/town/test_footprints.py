@@ -158,7 +158,7 @@ def test_polygons_of_a_file_without_tags_are_buildings_where_their_height_is_giv
     monkeypatch.chdir(tmp_path)
     plain = [feature({"name": "a"}, ring(30 * k, 0, 10, 10)) for k in range(5)]
     path = write(tmp_path / "plain.geojson", plain)
-    assert main(["scene", "inspect", str(path), "--height", "8"]) == 0
+    assert main(f"scene inspect {path} --height 8".split()) == 0
     said = capsys.readouterr().out
     assert "5 buildings" in said and "up to 8.0 m high" in said
     assert "read otherwise: 5 polygons without a tag of buildings" in said

@@ -267,16 +267,6 @@ def test_one_wall_and_the_ground_are_the_simpler_effects(tmp_path):
     assert 1e-9 < off.max() < 1e-3
 
 
-def test_a_knife_edge_loses_what_p526_says():
-    nu = np.array([-0.78, 0.0, 1.0, 2.4])
-    loss_db = -20 * np.log10(abs(edge_field(nu)))
-    # P.526-15, equation 31, an approximation to within 0.2 dB, and exactly 6.02 dB at grazing.
-    near = 6.9 + 20 * np.log10(np.sqrt((nu - 0.1) ** 2 + 1) + nu - 0.1)
-    np.testing.assert_allclose(loss_db, near, atol=0.25)
-    assert math.isclose(loss_db[1], 20 * math.log10(2), rel_tol=1e-12)
-    np.testing.assert_allclose(edge_field(nu) + edge_field(-nu), 1.0, atol=1e-12)
-
-
 @pytest.mark.parametrize("edge", range(3))
 def test_the_field_behind_an_edge_is_fresnels_integral(edge):
     nu = np.concatenate([np.linspace(-60, 60, 5001), [0.0, 1e-9, -1e-9, 1e3, -1e4, 3e5]])
@@ -342,21 +332,6 @@ def test_the_field_among_buildings_never_jumps():
         level = maximum_filter1d(abs(field), round(0.4 / step_m))[1:-2]
         largest.append((np.minimum(ahead, behind) / level).max())
     assert largest[1] < 0.2 * largest[0]
-
-
-def test_the_field_is_smooth_across_the_border_of_the_shadow():
-    wide = built([(0.0, 0.0, 2.0, 4000.0, 26.0)])
-    ends = np.stack([np.full(400, 60.0), np.full(400, 3.0), np.linspace(10, 30, 400)], axis=1)[
-        :, None
-    ]
-    lit, field = image_paths.direct(
-        wide, MAST, ends, image_paths.rays_to(ends, 0.0), WAVELENGTH_M, True
-    )
-    assert lit.any()
-    assert not lit.all()
-    assert abs(np.diff(field[:, 0])).max() < 0.1
-    assert abs(field[0, 0]) < 0.2
-    assert field[-1, 0] == 1.0
 
 
 def test_an_upright_edge_diffracts_on_both_sides_of_its_shadow_and_by_a_wall_that_goes_on_past_the_target():
@@ -499,11 +474,9 @@ def test_a_mesh_outside_the_folder_of_a_scene_is_not_opened(tmp_path):
             read(town.DEFAULTS | {"buildings": str(path)})
 
 
-def test_materials_are_those_of_p2040():
+def test_materials_are_found_by_their_names_and_refused_where_they_are_not_known():
     assert named("mat-itu_medium_dry_ground.001") == "medium_dry_ground"
     assert named("Roof tiles") is None
-    permittivity, conductivity = properties("concrete", 4.9e9, "test")
-    assert (permittivity, round(conductivity, 3)) == (5.24, 0.16)
     with pytest.raises(InputError, match="floorboard is known from 50 to 100 GHz"):
         properties("floorboard", 4.9e9, "here")
     assert all(law.low < law.high for law in MATERIALS.values())

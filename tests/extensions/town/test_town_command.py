@@ -40,5 +40,5 @@ def test_a_town_is_looked_at_and_its_scene_drafted(answer, tmp_path, monkeypatch
     masts = [station["position_m"][:2] for station in config["network"]["stations"].values()]
     np.testing.assert_allclose((low + high) / 2, np.mean(masts, axis=0), atol=0.1)
     check(config)
-    assert main(["scene", "new", str(town), "--out", "mine.yaml"]) == 2
-    assert main(["scene", "inspect", str(town), "--unit", "cubit"]) == 2
+    assert main(f"scene new {town} --out mine.yaml".split()) == 2
+    assert main(f"scene inspect {town} --unit cubit".split()) == 2

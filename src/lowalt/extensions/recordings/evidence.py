@@ -61,12 +61,13 @@ def _fitted(stretches: np.ndarray, order: int) -> tuple[np.ndarray, np.ndarray]:
     views = views - views.mean(axis=1, keepdims=True)
     past = views[..., :order]
     present = views[..., order]
-    gram = np.einsum("bti,btj->bij", past.conj(), past)
+    adjoint = past.conj().swapaxes(1, 2)
+    gram = adjoint @ past
     gram += 1e-12 * np.trace(gram, axis1=1, axis2=2).real[:, None, None] * np.eye(
         order
     ) + 1e-300 * np.eye(order)
-    taps = np.linalg.solve(gram, np.einsum("bti,bt->bi", past.conj(), present)[..., None])[..., 0]
-    return taps, present - np.einsum("bti,bi->bt", past, taps)
+    taps = np.linalg.solve(gram, adjoint @ present[..., None])
+    return taps[..., 0], present - (past @ taps)[..., 0]
 
 
 def step_bits(numbers: np.ndarray) -> float:
