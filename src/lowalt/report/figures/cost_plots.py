@@ -5,6 +5,7 @@ python -m lowalt.report.figures.cost_plots echo --table cost.csv --figure cost.s
 
 import argparse
 import math
+from typing import Any
 
 from matplotlib.figure import Figure
 
@@ -151,7 +152,7 @@ def echo(measured: list[dict[str, str]], narrow: bool = False) -> Plot:
     A line joins the numbers of points. measured: rows of cost.csv (keys ECHO); narrow: for
     telephones.
     """
-    rows = [
+    rows: list[dict[str, Any]] = [
         {
             "method": row["method"],
             "name": ", ".join(filter(None, (row["method"], row["tolerance"]))),

@@ -235,10 +235,10 @@ def target_picture(cloud: Cloud, config_path: Path = CONFIG, seed: int = 1) -> b
     config = load_yaml(config_path)
     row = _motion_row(cloud, config, seed)
     figure = plt.figure(figsize=(14, 13), layout="constrained")
-    views, instants, spectra = (
-        row_of.subplots(1, count)
-        for row_of, count in zip(figure.subfigures(3, 1), (3, 4, 3), strict=True)
-    )
+    top, middle_row, bottom = figure.subfigures(3, 1, squeeze=False)[:, 0]
+    views = top.subplots(1, 3)
+    instants = middle_row.subplots(1, 4)
+    spectra = bottom.subplots(1, 3)
     points = cloud.track[0] if len(cloud.track) else cloud.points
     middle, half = _limits(points)
     for panel, view in zip(views, DIRECTIONS, strict=True):
