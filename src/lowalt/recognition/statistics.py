@@ -11,6 +11,8 @@ import numpy as np
 from lowalt.recognition.intervals import Interval, model_weights
 from lowalt.recognition.predictions import Predictions
 
+BINS = 15
+"""Bins of confidence of the calibration error."""
 LOOKED_FOR = 0
 """Label of the target class, whose detections and false alarms are counted: the first class."""
 FEWEST_MISSED = 10
@@ -54,16 +56,16 @@ def confusion(labels: np.ndarray, guesses: np.ndarray, classes: int) -> np.ndarr
     return np.bincount(labels * classes + guesses, minlength=classes**2).reshape(classes, classes)
 
 
-def calibration(probabilities: np.ndarray, labels: np.ndarray, bins: int = 15) -> dict[str, float]:
-    """Expected calibration error (equal-width bins of confidence), Brier score and cross entropy.
+def calibration(probabilities: np.ndarray, labels: np.ndarray) -> dict[str, float]:
+    """Expected calibration error (BINS equal-width bins of confidence), Brier score and cross entropy.
 
     Source: Guo et al., On calibration of modern neural networks, 2017; Brier 1950 (sum over the
     classes).
     """
     confidence = probabilities.max(1)
     guesses = probabilities.argmax(1)
-    bin_of = np.minimum((confidence * bins).astype(int), bins - 1)
-    gap = np.bincount(bin_of, weights=confidence - (guesses == labels), minlength=bins)
+    bin_of = np.minimum((confidence * BINS).astype(int), BINS - 1)
+    gap = np.bincount(bin_of, weights=confidence - (guesses == labels), minlength=BINS)
     truth = np.eye(probabilities.shape[1])[labels]
     return {
         "calibration_error": float(np.abs(gap).sum() / len(labels)),

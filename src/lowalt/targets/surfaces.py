@@ -212,15 +212,13 @@ def hull(
     return loft(sections, tips)
 
 
-def box(
-    size: Iterable[float], centre: Iterable[float] = (0, 0, 0), exponent: float = 8.0
-) -> Surface:
+def box(size: Iterable[float], centre: Iterable[float] = (0, 0, 0)) -> Surface:
     """Return a box with the edge lengths `size` (x, y, z).
 
     The superellipse's exponent rounds its edges along y.
     """
     x, y, z = (float(value) / 2 for value in size)
-    return hull([(-y, x, -z, z), (y, x, -z, z)], exponent).moved(centre)
+    return hull([(-y, x, -z, z), (y, x, -z, z)], 8.0).moved(centre)
 
 
 def ring(profile: np.ndarray, sides: int = 32) -> Surface:
