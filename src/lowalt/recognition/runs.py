@@ -95,19 +95,29 @@ def train(
         "seed": settings["seed"],
         "classes": list(classes),
     }
-    of_model = {name: settings[name] for name in ("network", "colour_map")}
-    trainer.finish({**about, **of_model, "scheme": scheme.record})
+    trainer.finish(
+        {
+            **about,
+            "scheme": scheme.record,
+            "network": settings["network"],
+            "colour_map": settings["colour_map"],
+        }
+    )
     if machine.rank:
         return
-    of_run = {
-        "scheme": scheme.name,
-        "backbone": scheme.backbone_of(settings["network"]),
-        "weights": settings["network"]["weights"],
-        "parameters": recogniser.parameters(model),
-        "resumed": resumed,
-        "train_processor_s": busy,
-    }
-    _record(folder / "run.json", {**about, **of_run, **_spent(trainer, first, seconds)})
+    _record(
+        folder / "run.json",
+        {
+            **about,
+            **_spent(trainer, first, seconds),
+            "scheme": scheme.name,
+            "backbone": scheme.backbone_of(settings["network"]),
+            "weights": settings["network"]["weights"],
+            "parameters": recogniser.parameters(model),
+            "resumed": resumed,
+            "train_processor_s": busy,
+        },
+    )
 
 
 def _spent(trainer: Trainer, first: int, seconds: float) -> dict:

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Iterator
 from itertools import cycle, product
-from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -15,7 +14,7 @@ from lowalt.report.plots import NARROW_IN, Plot, drawn
 PAGE_WIDTH = 960
 CELL = 46
 """Width of the page's column, and of a cell of a matrix, in pixels; 100.0 fits into a cell."""
-SOURCES: dict[str, Any] = {"this run": "-", "paper": "--"}
+SOURCES: dict = {"this run": "-", "paper": "--"}
 """Style of the lines of each source."""
 
 

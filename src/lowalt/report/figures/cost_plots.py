@@ -5,7 +5,6 @@ python -m lowalt.report.figures.cost_plots echo --table cost.csv --figure cost.s
 
 import argparse
 import math
-from typing import Any
 
 from matplotlib.figure import Figure
 
@@ -152,7 +151,7 @@ def echo(measured: list[dict[str, str]], narrow: bool = False) -> Plot:
     A line joins the numbers of points. measured: rows of cost.csv (keys ECHO); narrow: for
     telephones.
     """
-    rows: list[dict[str, Any]] = [
+    rows: list[dict] = [
         {
             "method": row["method"],
             "name": ", ".join(filter(None, (row["method"], row["tolerance"]))),
