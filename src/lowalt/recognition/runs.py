@@ -79,9 +79,9 @@ def train(
     trainer = Trainer(model, samples, scheme.columns, {**settings, "training": block}, run, machine)
     resumed = trainer.resume()
     machine.agree(identity, trainer.at.steps)
-    if resumed and machine.rank == 0:
+    if resumed and not machine.rank:
         print(f"{folder}: resumed at step {trainer.at.steps}", file=sys.stderr)
-    if events and machine.rank == 0:
+    if events and not machine.rank:
         trainer.metrics = tensorboard(folder / "events", trainer.at.steps)
     first = trainer.at.steps
     began = time.monotonic()

@@ -12,7 +12,8 @@ from lowalt.recognition.intervals import Interval, model_weights
 from lowalt.recognition.predictions import Predictions
 
 BINS = 15
-"""Bins of confidence of the calibration error."""
+REPEATS = 400
+"""Bins of confidence of the calibration error, and repeats of a bootstrap."""
 LOOKED_FOR = 0
 """Label of the target class, whose detections and false alarms are counted: the first class."""
 FEWEST_MISSED = 10
@@ -110,7 +111,7 @@ def alarm_intervals(
     whole_subtypes: bool,
     generator: np.random.Generator,
     classes: int,
-    repeats: int = 400,
+    repeats: int = REPEATS,
 ) -> np.ndarray:
     """Bounds (classes, 2) of the 95 % intervals of detection and of the false alarm rates.
 
@@ -213,7 +214,6 @@ def f1_by_snr(
     classes: int,
     whole_subtypes: bool,
     generator: np.random.Generator,
-    repeats: int = 400,
 ) -> dict[float | str, Interval]:
     """Return macro F1 with its 95 % interval at each SNR, and as "avg" the mean over the SNRs.
 
@@ -224,8 +224,8 @@ def f1_by_snr(
     """
     test = parts[0]
     _, first, model = np.unique(test.motion, return_index=True, return_inverse=True)
-    weights = model_weights(test.subtype[first], whole_subtypes, repeats, generator)
-    drawn = generator.integers(0, len(parts), (repeats, len(parts)))
+    weights = model_weights(test.subtype[first], whole_subtypes, REPEATS, generator)
+    drawn = generator.integers(0, len(parts), (REPEATS, len(parts)))
     values: dict[float | str, float] = {}
     resampled: dict[float | str, np.ndarray] = {}
     for snr in np.unique(test.snr_db).tolist():
