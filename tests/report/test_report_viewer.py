@@ -38,16 +38,16 @@ LEVELS = (3.0, 8.0, 13.0, float("inf"))
 
 
 def shards(names):
-    """Keys, labels and SNRs of three motion models of each subtype; names: subtypes by label."""
+    """Keys, labels, models and SNRs of three motion models of each subtype; names: subtypes by label."""
     found = [
-        (sample_key(name, model, snr).encode(), label, snr)
+        (sample_key(name, model, snr).encode(), label, model, snr)
         for label, some in enumerate(names)
         for name in some
         for model in (7, 1, 4)
         for snr in LEVELS
     ]
-    keys, labels, snrs = (np.array(column) for column in zip(*found, strict=True))
-    return SimpleNamespace(keys=keys, labels=labels, snrs_db=snrs)
+    keys, labels, models, snrs = (np.array(column) for column in zip(*found, strict=True))
+    return SimpleNamespace(keys=keys, labels=labels, models=models, snrs_db=snrs)
 
 
 def test_each_class_has_a_seen_and_an_unseen_subtype_and_predicted_samples_go_first():

@@ -12,7 +12,7 @@ from dataset import SEED, motion_rows
 from forks import printed
 from lowalt.config.network import Network
 from lowalt.files.errors import InputError
-from lowalt.shards.sample_list import sample_key, snr_label
+from lowalt.shards.sample_list import sample_key, slug_of, snr_label
 from lowalt.shards.sample_record import DATA_VERSION, geometry, record, row_of
 from lowalt.shards.tar import Writer
 from pictures import NETWORK
@@ -135,6 +135,7 @@ def test_a_tar_header_holds_names_of_a_hundred_bytes_and_no_more():
 
 def test_keys_are_unique_and_without_dots():
     assert sample_key("EH216-S", 7, 3.5) == "eh216-s-000007-snr003p5"
+    assert slug_of(sample_key("EH216-S", 1_234_567, -5.0)) == "eh216-s"
     snrs = [3, 3.5, -60, 200, 0.25, math.inf, 13, -3.5]
     keys = {sample_key("EH216-S", 7, snr) for snr in snrs}
     assert len(keys) == len(snrs)

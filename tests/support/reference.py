@@ -77,9 +77,9 @@ def echo(network, station, positions_m, rcs_m2, aim_m):
     return cells[np.arange(len(cells)), best], best
 
 
-def cell_mp(network, station, points_m, rcs_m2, aim_m, cell, digits=50):
-    """One cell of one symbol, a Python complex, from `digits` decimal digits of arithmetic.
+def cell_mp(network, station, points_m, rcs_m2, aim_m, cell):
+    """One cell of one symbol, a Python complex, from fifty decimal digits of arithmetic.
 
     points_m: a list of L positions of three numbers (floats or mpmath numbers), taken as exact.
     """
-    return complex(cells_mp(network, station, points_m, rcs_m2, aim_m, [cell], digits)[0])
+    return complex(cells_mp(network, station, points_m, rcs_m2, aim_m, [cell])[0])

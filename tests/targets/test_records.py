@@ -84,7 +84,7 @@ def test_a_later_file_replaces_whole_records(tmp_path, written):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"source": "clay"}, r"Crow: source is 'clay', expected one of"),
+        ({"source": "clay"}, r"Crow: source: value 'clay', expected one of"),
         ({"colour": "black"}, r"Crow: record: unknown key\(s\) \['colour'\]"),
         ({"points": 0}, "Crow: points: value 0, expected at least 1"),
         ({"points": True}, "Crow: points: value True"),

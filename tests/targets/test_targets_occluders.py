@@ -13,7 +13,7 @@ from lowalt.files.errors import InputError
 from lowalt.targets import occluders
 from lowalt.targets.builtin import MODULES
 from lowalt.targets.skeleton import NODES, PARENTS
-from lowalt.targets.surfaces import Surface, box, longest_edge, quartered
+from lowalt.targets.surfaces import Surface, hull, longest_edge, quartered
 
 
 def areas(corners):
@@ -46,7 +46,8 @@ def test_a_cut_takes_the_area_inside_it_to_a_triangle_s_size():
     square = Surface(
         np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]), np.array([[0, 1, 2], [0, 2, 3]])
     )
-    left = occluders.cut_away(square, (box((0.5, 0.5, 1.0), (0.5, 0.5, 0.0), exponent=200.0),))
+    sharp = hull([(0.25, 0.25, -0.5, 0.5), (0.75, 0.25, -0.5, 0.5)], 200.0).moved([0.5, 0, 0])
+    left = occluders.cut_away(square, (sharp,))
     corners = left.vertices[left.faces]
     assert areas(corners).sum() == pytest.approx(0.75, abs=0.02)
     inner = corners.mean(1)

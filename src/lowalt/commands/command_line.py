@@ -41,6 +41,13 @@ def add_command(
     return line
 
 
+def add_group(commands: argparse._SubParsersAction, name: str) -> argparse._SubParsersAction:
+    """Add a command that has commands of its own, and return these."""
+    _, meaning, example = COMMANDS[name]
+    line = commands.add_parser(name, help=meaning, epilog=f"example: {example}")
+    return line.add_subparsers(metavar="COMMAND", required=True)
+
+
 def positive(limit: float, expected: str) -> Callable[[str], float]:
     """Return the type of an option that is a number between 0 and a limit.
 

@@ -3,7 +3,6 @@
 import argparse
 import sys
 from pathlib import Path
-from types import ModuleType
 
 from lowalt.commands.command_line import Answer, add_command
 from lowalt.config.command import add_backbone_option
@@ -49,7 +48,8 @@ def run(options: argparse.Namespace) -> Answer:
     existing(options.input, "input")
     reader = None
     if options.input.suffix in readers:
-        reader = _reader(options.input.suffix)
+        suffix = options.input.suffix
+        reader = module_offered("readers", suffix, readers[suffix])
         content = reader.read(options.input)
     config: dict = {}
     if options.overlay:
@@ -79,8 +79,3 @@ def run(options: argparse.Namespace) -> Answer:
     best_first = sorted(shares.items(), key=lambda pair: -pair[1])
     lines = [f"{100 * share:6.2f} %  {name}" for name, share in best_first]
     return Answer(shares, "\n".join(lines))
-
-
-def _reader(suffix: str) -> ModuleType:
-    """The module of the extension that reads files of this suffix."""
-    return module_offered("readers", suffix, offered("readers")[suffix])

@@ -13,7 +13,7 @@ from lowalt.echo.chunk import clean_signals
 from lowalt.files.atomic import replacing
 from lowalt.files.errors import InputError
 from lowalt.motion import read_table
-from lowalt.targets.cloud import read
+from lowalt.targets.cloud import read_clouds
 
 
 def main(arguments: list[str]) -> None:
@@ -39,7 +39,7 @@ def main(arguments: list[str]) -> None:
         )
     block, tolerance = pick(given.settings, "network", "tolerance")
     network = Network.from_settings(block)
-    clouds = {cloud.subtype: cloud for cloud in map(read, given.clouds)}
+    clouds = read_clouds(given.clouds)
     result = clean_signals(network, given.station, clouds, read_table(given.motion), tolerance)
     for path, signals in zip(given.out, result, strict=True):
         with replacing(path, signals.nbytes) as temporary:

@@ -78,8 +78,6 @@ class Radar(NamedTuple):
     """a0 lambda / (4 pi)^(3/2): with sqrt(rcs) / r^2 and G it gives a point's amplitude."""
     centre_hz: float
     """The effective carrier (Hz), for delays of extra paths."""
-    bandwidth_hz: float
-    """M df (Hz): range cells per second of delay."""
     exact: np.ndarray
     """(8, 2), the constants as double-doubles in the order of `Exact`.
 
@@ -134,6 +132,5 @@ def radar(network: Network, station: Station) -> Radar:
         subcarriers=int(network.subcarriers),
         scale=exact.scale[0],
         centre_hz=float(centre),
-        bandwidth_hz=float(bandwidth),
         exact=np.array(exact),
     )

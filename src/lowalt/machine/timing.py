@@ -4,6 +4,9 @@ import statistics
 import time
 from collections.abc import Callable
 
+CALLS = 30
+"""Calls of which `least_s` takes the least time."""
+
 
 def in_turn(
     calls: list[tuple[Callable[[], object], int, int]],
@@ -33,10 +36,8 @@ def median_s(work: Callable[[], object], repeats: int) -> float:
     return in_turn([(work, repeats, 1)])[0][0]
 
 
-def least_s(
-    work: Callable[[], object], limit_s: float, clock: Callable[[], float], repeats: int = 30
-) -> float:
-    """Return the least time (s) by `clock` of up to `repeats` calls, after one that warms up.
+def least_s(work: Callable[[], object], limit_s: float, clock: Callable[[], float]) -> float:
+    """Return the least time (s) by `clock` of up to CALLS calls, after one that warms up.
 
     Calls stop once they took `limit_s` together. If the first call alone takes that long, its time
     is the result.
@@ -45,7 +46,7 @@ def least_s(
     if spent > limit_s:
         return spent
     best = float("inf")
-    for _ in range(repeats):
+    for _ in range(CALLS):
         seconds, _ = once(work, clock)
         best = min(best, seconds)
         spent += seconds

@@ -11,6 +11,7 @@ import numpy as np
 
 C = 299_792_458
 """Speed of light (m/s), exact."""
+DIGITS = 50
 
 
 def _run(step, length: int):
@@ -26,13 +27,13 @@ def _run(step, length: int):
     return total
 
 
-def positions_mp(motion, n: int, digits: int = 50) -> list[list]:
+def positions_mp(motion, n: int) -> list[list]:
     """Return the positions (L, 3) of symbol n of a rigid motion as mpmath numbers.
 
     Nothing is rounded in float64.
     """
     positions = []
-    with mpmath.workdps(digits):
+    with mpmath.workdps(DIGITS):
         for point, part in zip(motion.points.tolist(), motion.part, strict=True):
             rotation = motion.rotation[n, part].tolist()
             translation = motion.translation[n, part].tolist()
@@ -41,13 +42,13 @@ def positions_mp(motion, n: int, digits: int = 50) -> list[list]:
     return positions
 
 
-def cells_mp(network, station, points_m, rcs_m2, aim_m, cells, digits=50):
+def cells_mp(network, station, points_m, rcs_m2, aim_m, cells):
     """The listed cells of one symbol as mpmath complex numbers.
 
     points_m: L positions of three numbers, taken as exact.
     Each point's steering and subcarrier sums are plain geometric sums over exactly given phases.
     """
-    with mpmath.workdps(digits):
+    with mpmath.workdps(DIGITS):
         mpf = mpmath.mpf
         pi = mpmath.pi
         carrier = mpf(network.carrier_hz)

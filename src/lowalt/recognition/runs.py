@@ -79,56 +79,67 @@ def train(
     trainer = Trainer(model, samples, scheme.columns, {**settings, "training": block}, run, machine)
     resumed = trainer.resume()
     machine.agree(identity, trainer.at.steps)
-    if resumed and machine.rank == 0:
+    if resumed and not machine.rank:
         print(f"{folder}: resumed at step {trainer.at.steps}", file=sys.stderr)
-    if events and machine.rank == 0:
+    if events and not machine.rank:
         trainer.metrics = tensorboard(folder / "events", trainer.at.steps)
+    first = trainer.at.steps
     began = time.monotonic()
     busy = time.process_time()
-    steps = trainer.at.steps
-    at = trainer.fit()
+    trainer.fit()
     seconds = time.monotonic() - began
     busy = time.process_time() - busy
+    about = {
+        "protocol": protocol,
+        "size": settings["size"],
+        "seed": settings["seed"],
+        "classes": list(classes),
+    }
     trainer.finish(
         {
+            **about,
             "scheme": scheme.record,
-            "protocol": protocol,
             "network": settings["network"],
-            "size": settings["size"],
-            "seed": settings["seed"],
             "colour_map": settings["colour_map"],
-            "classes": list(classes),
         }
     )
-    if machine.rank == 0:
-        _record(
-            folder / "run.json",
-            {
-                "protocol": protocol,
-                "scheme": scheme.name,
-                "seed": settings["seed"],
-                "hardware": describe(),
-                "backbone": scheme.backbone_of(settings["network"]),
-                "weights": settings["network"]["weights"],
-                "parameters": recogniser.parameters(model),
-                "train_samples": len(samples["train"].facts),
-                "samples_seen": at.steps * block["batch"],
-                "validation_accuracy": at.best,
-                "train_s": seconds,
-                "train_processor_s": busy,
-                "size": settings["size"],
-                "steps": at.steps,
-                "batch": block["batch"],
-                "samples_per_s": (at.steps - steps) * block["batch"] / max(seconds, 1e-9),
-                "resumed": resumed,
-                "precision": machine.precision,
-                "waiting_share": trainer.waited_s / max(seconds, 1e-9),
-                "ranks": machine.ranks,
-                "torch": torch.__version__,
-                "timm": timm.__version__,
-                "classes": list(classes),
-            },
-        )
+    if machine.rank:
+        return
+    _record(
+        folder / "run.json",
+        {
+            **about,
+            **_spent(trainer, first, seconds),
+            "scheme": scheme.name,
+            "backbone": scheme.backbone_of(settings["network"]),
+            "weights": settings["network"]["weights"],
+            "parameters": recogniser.parameters(model),
+            "resumed": resumed,
+            "train_processor_s": busy,
+        },
+    )
+
+
+def _spent(trainer: Trainer, first: int, seconds: float) -> dict:
+    """What a training that began at step `first` did in this time, and on which machine."""
+    at = trainer.at
+    batch = trainer.block["batch"]
+    time_s = max(seconds, 1e-9)
+    return {
+        "hardware": describe(),
+        "precision": trainer.machine.precision,
+        "ranks": trainer.machine.ranks,
+        "torch": torch.__version__,
+        "timm": timm.__version__,
+        "train_samples": len(trainer.train.facts),
+        "steps": at.steps,
+        "batch": batch,
+        "samples_seen": at.steps * batch,
+        "validation_accuracy": at.best,
+        "train_s": seconds,
+        "samples_per_s": (at.steps - first) * batch / time_s,
+        "waiting_share": trainer.waited_s / time_s,
+    }
 
 
 def _identity(

@@ -11,6 +11,9 @@ import numpy as np
 from lowalt.recognition.intervals import Interval, model_weights
 from lowalt.recognition.predictions import Predictions
 
+BINS = 15
+REPEATS = 400
+"""Bins of confidence of the calibration error, and repeats of a bootstrap."""
 LOOKED_FOR = 0
 """Label of the target class, whose detections and false alarms are counted: the first class."""
 FEWEST_MISSED = 10
@@ -54,16 +57,16 @@ def confusion(labels: np.ndarray, guesses: np.ndarray, classes: int) -> np.ndarr
     return np.bincount(labels * classes + guesses, minlength=classes**2).reshape(classes, classes)
 
 
-def calibration(probabilities: np.ndarray, labels: np.ndarray, bins: int = 15) -> dict[str, float]:
-    """Expected calibration error (equal-width bins of confidence), Brier score and cross entropy.
+def calibration(probabilities: np.ndarray, labels: np.ndarray) -> dict[str, float]:
+    """Expected calibration error (BINS equal-width bins of confidence), Brier score and cross entropy.
 
     Source: Guo et al., On calibration of modern neural networks, 2017; Brier 1950 (sum over the
     classes).
     """
     confidence = probabilities.max(1)
     guesses = probabilities.argmax(1)
-    bin_of = np.minimum((confidence * bins).astype(int), bins - 1)
-    gap = np.bincount(bin_of, weights=confidence - (guesses == labels), minlength=bins)
+    bin_of = np.minimum((confidence * BINS).astype(int), BINS - 1)
+    gap = np.bincount(bin_of, weights=confidence - (guesses == labels), minlength=BINS)
     truth = np.eye(probabilities.shape[1])[labels]
     return {
         "calibration_error": float(np.abs(gap).sum() / len(labels)),
@@ -108,7 +111,7 @@ def alarm_intervals(
     whole_subtypes: bool,
     generator: np.random.Generator,
     classes: int,
-    repeats: int = 400,
+    repeats: int = REPEATS,
 ) -> np.ndarray:
     """Bounds (classes, 2) of the 95 % intervals of detection and of the false alarm rates.
 
@@ -211,7 +214,6 @@ def f1_by_snr(
     classes: int,
     whole_subtypes: bool,
     generator: np.random.Generator,
-    repeats: int = 400,
 ) -> dict[float | str, Interval]:
     """Return macro F1 with its 95 % interval at each SNR, and as "avg" the mean over the SNRs.
 
@@ -222,8 +224,8 @@ def f1_by_snr(
     """
     test = parts[0]
     _, first, model = np.unique(test.motion, return_index=True, return_inverse=True)
-    weights = model_weights(test.subtype[first], whole_subtypes, repeats, generator)
-    drawn = generator.integers(0, len(parts), (repeats, len(parts)))
+    weights = model_weights(test.subtype[first], whole_subtypes, REPEATS, generator)
+    drawn = generator.integers(0, len(parts), (REPEATS, len(parts)))
     values: dict[float | str, float] = {}
     resampled: dict[float | str, np.ndarray] = {}
     for snr in np.unique(test.snr_db).tolist():

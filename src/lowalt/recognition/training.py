@@ -286,7 +286,7 @@ class Trainer:
         self.at.loss_steps = 0
         self.at.done = bool(self.block["patience"]) and self.at.since_best >= self.block["patience"]
 
-    def fit(self) -> TrainingState:
+    def fit(self) -> None:
         """Train from the current state to the last step, or until validation stops improving."""
         start = time.monotonic()
         saved = time.monotonic()
@@ -325,7 +325,6 @@ class Trainer:
             if self.at.batch == len(of_epoch):
                 self.at.epoch += 1
                 self.at.batch = 0
-        return self.at
 
     def _say(self, start: float, first: int) -> None:
         """Print the last validation and the speed.

@@ -7,7 +7,6 @@ sizes to which the tiles stage has reduced its images, the cache is made without
 
 import json
 import math
-import re
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,9 +19,8 @@ from lowalt.recognition import samples
 from lowalt.recognition.samples import Facts
 from lowalt.recognition.schemes import columns_in
 from lowalt.shards import ShardSet
+from lowalt.shards.sample_list import slug_of
 from lowalt.tiles import reduced
-
-_KEY = re.compile(r"(.+)-\d{6}-snr.*")
 
 
 def geometry(record: dict, network: Network) -> tuple[list[float], list[float]]:
@@ -73,7 +71,7 @@ def facts_of(shards: ShardSet, numbers: np.ndarray, placed: bool = True) -> Fact
     names: dict[str, str] = {}
     subtypes = []
     for sample, number in enumerate(numbers):
-        slug = _KEY.sub(r"\1", keys[sample])
+        slug = slug_of(keys[sample])
         if placed or slug not in names:
             record = shards.record(number)
             names[slug] = record["subtype"]

@@ -11,6 +11,7 @@ run.
 
 import json
 from pathlib import Path
+from typing import Any
 
 from lowalt.files.atomic import existing, text_of
 from lowalt.files.csv_tables import read_csv
@@ -47,7 +48,7 @@ OPTIONAL = (
 class Inputs:
     """The files of a manifest by their names."""
 
-    def __init__(self, files: dict[str, str | list[str]], source: str = "manifest") -> None:
+    def __init__(self, files: dict[str, Any], source: str = "manifest") -> None:
         """files: path or list of paths by name; source: the manifest's own path, for messages.
 
         Raises: InputError for names that are missing or unknown.

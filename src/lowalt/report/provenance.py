@@ -76,7 +76,7 @@ def _numbers(value: Any) -> Any:
 
 def _differing(base: dict, config: dict) -> dict:
     """The keys of `changes` with their values, infinities as words."""
-    differing = {}
+    differing: dict = {}
     for key in [*config, *(key for key in base if key not in config)]:
         value = config.get(key)
         base_value = base.get(key)

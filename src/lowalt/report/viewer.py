@@ -7,7 +7,6 @@ is kept at FRAMES instants of one cycle.
 
 import base64
 import csv
-import re
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import NamedTuple
@@ -25,6 +24,7 @@ from lowalt.report.figures.tile_axes import axes_of
 from lowalt.report.viewer_echoes import FLOOR_DB, echoes
 from lowalt.report.viewer_truth import colours, truth
 from lowalt.shards import ShardSet
+from lowalt.shards.sample_list import slug_of
 from lowalt.shards.sample_record import row_of
 from lowalt.spectra import spectrum
 from lowalt.targets.cloud import Cloud
@@ -45,7 +45,6 @@ FRAMES = 24
 POINTS = 160
 """Largest number of points of a cloud that are drawn."""
 LARGEST_INT16 = 32767
-KEY = re.compile(r"(.+)-(\d{6,})-snr.+")
 TIME = "time (s)"
 WITHOUT = "none"
 """Word for the absence of an effect."""
@@ -72,9 +71,10 @@ def chosen(shards: ShardSet, predicted: set[str], unseen: set[str]) -> list[int]
     a sample of every subtype in each, so that leaving out the last ones leaves out no subtype.
     """
     keys = [key.decode() for key in shards.keys.tolist()]
+    models = shards.models.tolist()
     groups: dict[tuple, dict[str, list[int]]] = {}
     for number, (key, label) in enumerate(zip(keys, shards.labels.tolist(), strict=True)):
-        name = KEY.fullmatch(key)[1]
+        name = slug_of(key)
         subtypes = groups.setdefault((label, name in unseen), {})
         subtypes.setdefault(name, []).append(number)
     picks: list[tuple[int, int]] = []
@@ -87,8 +87,8 @@ def chosen(shards: ShardSet, predicted: set[str], unseen: set[str]) -> list[int]
         chosen_subtype = min(with_predictions or subtypes)
         of_model: dict[tuple, list[int]] = {}
         for number in subtypes[chosen_subtype]:
-            model = int(KEY.fullmatch(keys[number])[2])
-            of_model.setdefault((keys[number] not in predicted, model), []).append(number)
+            model = (keys[number] not in predicted, models[number])
+            of_model.setdefault(model, []).append(number)
         for order, (_, numbers) in enumerate(sorted(of_model.items())[:MODELS]):
             by_snr = sorted(numbers, key=lambda number: shards.snrs_db[number])
             # The clearest, the noisiest, then the one between them; once each if they coincide.
@@ -100,7 +100,7 @@ def chosen(shards: ShardSet, predicted: set[str], unseen: set[str]) -> list[int]
 
 def predicted_keys(paths: Iterable[str | Path]) -> set[str]:
     """Return the keys of all samples in prediction files."""
-    keys = set()
+    keys: set[str] = set()
     for path in paths:
         with text_file(path, "predictions") as file:
             keys.update(row[0] for row in csv.reader(file))
@@ -115,8 +115,8 @@ def probabilities(
     They are those of the first file per protocol and scheme.
     """
     columns = predictions.probability_columns(classes)
-    first = {}
-    of_samples = {}
+    first: dict[Path, Path] = {}
+    of_samples: dict[str, dict] = {}
     for path in paths:
         first.setdefault(Path(path).parent, Path(path))
     for path in first.values():

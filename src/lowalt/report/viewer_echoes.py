@@ -57,7 +57,7 @@ def echoes(
         speed = geometry[station.name]["radial_mps"]
         entry: dict = {"power": power(signal), "phase": phase(signal)}
         if speed is not None and math.isfinite(speed):
-            shown = float(network.folded_mps(speed, station))
+            shown = float(network.folded_mps(np.asarray(speed), station))
             folds = round(abs(speed - shown) / (2 * network.largest_mps(station)))
             entry |= {"speed": round(speed, 2), "shown": round(shown, 2), "folds": folds}
             entry["range"] = round(geometry[station.name]["range_m"], 1)

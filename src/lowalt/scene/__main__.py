@@ -15,7 +15,7 @@ from lowalt.motion import read_table
 from lowalt.scene.chain import scene_signals
 from lowalt.scene.effects import called
 from lowalt.scene.observe import Scene
-from lowalt.targets.cloud import read
+from lowalt.targets.cloud import read_clouds
 
 
 def main(arguments: list[str]) -> None:
@@ -57,7 +57,7 @@ def main(arguments: list[str]) -> None:
         asked.settings, "seed", "network", "tolerance", "effects"
     )
     scene = Scene(Network.from_settings(block), seed, tolerance, tuple(called(effects)))
-    clouds = {cloud.subtype: cloud for cloud in map(read, asked.clouds)}
+    clouds = read_clouds(asked.clouds)
     occluders = {}
     if asked.occluders:
         from lowalt.targets.occluders import read_all

@@ -10,7 +10,7 @@ from typing import NamedTuple
 from lowalt.config.blocks import snrs_of
 from lowalt.config.network import Network
 from lowalt.files.errors import InputError
-from lowalt.scene.effects import called, complete, every, module_of, with_offer
+from lowalt.scene.effects import called, complete, module_of, with_offer
 
 
 class CheckedScene(NamedTuple):
@@ -64,8 +64,7 @@ def check(config: dict, all_cells: bool = False) -> CheckedScene:
     refuse_same_waves(scene)
     refuse_unmodelled(scene.network, scene.modules)
     refuse_missing(scene.network, [module_of(name) for name in config["effects"]])
-    coloured = [name for name, module in scene.modules.items() if hasattr(module, "SET_SNR")]
-    coloured += every(effects, "filtered")
+    coloured = [*scene.offering("SET_SNR"), *scene.offering("filtered")]
     if scene.noisy and coloured and config.get("shards", {}).get("kind") == "recipe":
         raise InputError(
             "shards.kind: 'recipe' draws white noise as samples are read, expected 'image' or "
@@ -148,3 +147,11 @@ def above_ground(effect: str, network: Network) -> None:
                 f"effects.{effect}: station {station.name} stands at z = {station.position_m[2]} "
                 "m, expected above the ground z = 0"
             )
+
+
+def between_stations(effect: str, network: Network) -> None:
+    """Raise InputError naming `effect` for a network without links."""
+    if not links_of(network):
+        raise InputError(
+            f"effects.{effect}: no station of the network is a link, expected {{transmit, receive}}"
+        )

@@ -158,15 +158,14 @@ def _rings(
     half_m: float,
     heights_m: tuple[float, float],
     turns: int,
-    nodes: int,
 ) -> _Rings:
-    """Return `nodes` ellipses in each range cell; turns: half the patches of a circle."""
+    """Return NODES ellipses in each range cell; turns: half the patches of a circle."""
     low, high = _edges(station, reach_m, cells_per_m)
     cells = len(low)
     lit = np.flatnonzero(high > low)
     low = low[lit]
     high = high[lit]
-    node, share = gauss_legendre(nodes)
+    node, share = gauss_legendre(NODES)
     middle = 0.5 * (high + low)[:, None]
     half_extent = 0.5 * (high - low)[:, None]
     t = (middle + half_extent * node).ravel()
@@ -209,9 +208,7 @@ def _patches(
 
 
 @lru_cache(maxsize=12)
-def land(
-    network: Network, station: Station, reach_m: float, element: Element | None, nodes: int = NODES
-) -> Land:
+def land(network: Network, station: Station, reach_m: float, element: Element | None) -> Land:
     """Return the patches of land up to the half range sum `reach_m`.
 
     element: the antennas', None for isotropic.
@@ -230,7 +227,7 @@ def land(
     # Over azimuth the trapezoidal rule is exact for a station's arrays, whose patterns are
     # trigonometric.
     turns = int(np.pi * radio.kappa * (network.transmit[0] + network.receive[0])) + 24
-    rings = _rings(station, reach_m, radio.cells, half_m, heights_m, turns, nodes)
+    rings = _rings(station, reach_m, radio.cells, half_m, heights_m, turns)
     points, weight = _patches(rings, masts_m, half_m, axis)
     r1 = portable.norm(points - masts_m[0])
     r2 = portable.norm(points - masts_m[1])
@@ -253,7 +250,7 @@ def land(
         seen = on_circles[:, :, 0].reshape(1, 2, -1)
         slow = np.ones(len(weight))
         counts = counts // 2
-    of_cells = counts.reshape(-1, nodes).sum(axis=1)
+    of_cells = counts.reshape(-1, NODES).sum(axis=1)
     first = np.cumsum(of_cells) - of_cells
     return Land(rings.lit, first, rings.cells, weight, seen, slow)
 
@@ -264,7 +261,6 @@ def cell_power(
     station: Station,
     aims_m: np.ndarray,
     element: Element | None = None,
-    nodes: int = NODES,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the mean power (cells,) W of the land in every cell, and the factor on its Doppler.
 
@@ -275,7 +271,7 @@ def cell_power(
     G_R sigma0 / (R1^2 R2^2) over the land of a range sum, with sigma0 = gamma (sin psi_1 sin
     psi_2)^(1/2). Source: Willis, Bistatic Radar.
     """
-    held = land(network, station, settings["reach_m"], element, nodes)
+    held = land(network, station, settings["reach_m"], element)
     radio = radar(network, station)
     power = np.zeros(held.cells)
     slow = np.ones(held.cells)

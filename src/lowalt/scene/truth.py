@@ -50,22 +50,18 @@ def geometric(view: View) -> np.ndarray:
 
     They are those of the target's middle.
     """
-    station = view.station
     middle = middle_of(view)
     moved = rate(middle_of, view)
-    ends = [station]
-    if station.transmitter is not None:
-        ends.append(station.transmitter)
     ranges = []
     speeds = []
-    for end in ends:
-        way = middle - np.asarray(end.position_m)
+    for mast_m in view.masts_m:
+        way = middle - mast_m
         length = portable.norm(way)
         ranges.append(length)
         speeds.append((way * moved).sum(axis=1) / length)
     range_m = np.mean(ranges, axis=0)
     radial_mps = np.mean(speeds, axis=0)
-    return np.column_stack([range_m, radial_mps, cosines(station, middle)])
+    return np.column_stack([range_m, radial_mps, cosines(view.station, middle)])
 
 
 def array_turns(view: View) -> np.ndarray:

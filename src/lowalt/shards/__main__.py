@@ -15,7 +15,7 @@ from lowalt.shards.sample_record import accompanied
 from lowalt.shards.sample_table import KINDS
 from lowalt.shards.sizes import CELL_BYTES, cell_type
 from lowalt.shards.write import ChunkSamples, write_shard
-from lowalt.targets.cloud import read as read_cloud
+from lowalt.targets.cloud import read_clouds
 from lowalt.targets.occluders import read_all
 from lowalt.tiles.cubes import Cubes
 
@@ -84,7 +84,7 @@ def write(arguments: list[str]) -> None:
     if kind == "recipe":
         content, powers = clean_content(options.echoes, options.powers, network, len(rows))
     elif kind == "cube":
-        clouds = {cloud.subtype: cloud for cloud in map(read_cloud, options.clouds)}
+        clouds = read_clouds(options.clouds)
         occluders = read_all(options.occluders) if options.occluders else None
         cubes = Cubes.from_settings(scene, clouds, occluders)
         content = cube_content(options.signals, cubes, rows, snrs, cells)

@@ -27,12 +27,12 @@ from lowalt.shards import checksums
 from lowalt.shards.croissant import FIELDS, metadata
 from lowalt.shards.hub import front
 from lowalt.shards.read import ShardSet
+from lowalt.shards.sample_list import slug_of
 from lowalt.shards.sample_record import DATA_VERSION
 from lowalt.shards.sample_table import EXTENSIONS
 
 FROZEN = re.compile(r"lowalt-\d+-v(\d+)")
 """Name of a run that makes the data set of a benchmark, which only a new version may change."""
-SLUG = re.compile(r"(.+)-\d{6}-snr")
 PAPER = "H. Luo et al., Networked ISAC Enabled Target Recognition Towards Low-Altitude Economy"
 LICENSES = {
     "MIT": "https://opensource.org/license/mit",
@@ -57,17 +57,6 @@ def _table(header: tuple[str, ...], rows: list[tuple]) -> str:
     return text
 
 
-def _slug(key: str) -> str:
-    """The subtype's file name at the start of a sample's key, {subtype}-{model, six digits}-{SNR}.
-
-    Raises: InputError naming a key of another form.
-    """
-    match = SLUG.match(key)
-    if match is None:
-        raise InputError(f"sample key {key!r}: expected SUBTYPE-MODEL-snrSNR")
-    return match[1]
-
-
 class Census(NamedTuple):
     """The subtypes of a data set: a record of each by its slug, and counts of samples.
 
@@ -86,7 +75,7 @@ def _census(shards: ShardSet) -> Census:
     snrs: Counter = Counter()
     start = 0
     for _, table in shards.tables():
-        slugs = [_slug(key.decode()) for key in table["key"].tolist()]
+        slugs = [slug_of(key.decode()) for key in table["key"].tolist()]
         for number, slug in enumerate(slugs, start):
             first.setdefault(slug, number)
         subtypes.update(slugs)
@@ -132,7 +121,7 @@ def write_samples(shards: ShardSet, path: Path) -> None:
             columns = (table[name].tolist() for name in ("key", "label", "model", "snr_db"))
             for stored_key, label, model, snr_db in zip(*columns, strict=True):
                 key = stored_key.decode()
-                record = records[_slug(key)]
+                record = records[slug_of(key)]
                 # The samples of a motion model in a recipe shard share a member.
                 name = key.rpartition("-")[0] if shards.kind == "recipe" else key
                 yield {

@@ -6,6 +6,7 @@ Data sets, the benchmark and its scores count and name samples by this list alon
 import functools
 import itertools
 import math
+import re
 from collections.abc import Iterable, Iterator, Mapping
 from typing import NamedTuple
 
@@ -56,6 +57,17 @@ def sample_key(subtype: str, model: int, snr_db: float) -> str:
     Keys are unique, have no dots, and sort by subtype and motion model.
     """
     return f"{model_key(subtype, model)}-{snr_label(snr_db)}"
+
+
+def slug_of(key: str) -> str:
+    """Return the slug of the subtype at the start of a sample's key.
+
+    Raises: InputError naming a key of another form.
+    """
+    match = re.match(r"(.+)-\d{6,}-snr", key)
+    if match is None:
+        raise InputError(f"sample key {key!r}: expected SUBTYPE-MODEL-snrSNR")
+    return match[1]
 
 
 def refuse_unknown(groups: Iterable[str], folds: Iterable[str]) -> None:

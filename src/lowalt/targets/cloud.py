@@ -24,7 +24,7 @@ body-centred, front +y, up +z. Every point belongs to one part; every part excep
 """
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import chain
 from pathlib import Path
@@ -278,6 +278,11 @@ def write(path: str | Path, cloud: Cloud) -> None:
     }
     with replacing(path) as temporary:
         write_arrays(temporary, arrays)
+
+
+def read_clouds(paths: Iterable[str | Path]) -> dict[str, Cloud]:
+    """Return the clouds of files by their subtypes. Raises: as `read`."""
+    return {cloud.subtype: cloud for cloud in map(read, paths)}
 
 
 def read(path: str | Path) -> Cloud:

@@ -160,12 +160,11 @@ def stance_speed_mps(
     cycle: np.ndarray,
     rate_hz: float,
     speed_mps: float,
-    height_m: float = 0.02,
     feet: Sequence[int] = FEET,
 ) -> float:
     """Return the mean ground speed (m/s) of the lowest foot node while it carries the body.
 
-    A foot carries the body while it is within `height_m` of the ground. `cycle` (F, L, 3) cyclic,
+    A foot carries the body while it is within 2 cm of the ground. `cycle` (F, L, 3) cyclic,
     `feet` the numbers of the foot nodes, front +y, horizontal progress left out; `speed_mps` is
     added back. A foot that stands still has the speed zero. The ground is the feet's lowest point.
     """
@@ -177,7 +176,7 @@ def stance_speed_mps(
     height = positions[..., 2]
     lowest = height.argmin(axis=1)
     frames = np.arange(len(positions))
-    down = height[frames, lowest] < height.min() + height_m
+    down = height[frames, lowest] < height.min() + 0.02
     speeds = portable.norm(velocity[frames, lowest, :2])
     return float(portable.mean(speeds[down]))
 

@@ -281,16 +281,20 @@ def edges_of(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return edges[first], first % len(faces), uses
 
 
-def _mesh(vertices: np.ndarray, faces: np.ndarray) -> Mesh:
-    """Return a surface with its connected components, each closed one turned outward.
+def components(faces: np.ndarray, count: int) -> np.ndarray:
+    """Return the number (F,) of the connected component of each triangle (F, 3) of `count` vertices.
 
     Faces that share a vertex are connected.
     """
     links = np.concatenate([faces[:, :2], faces[:, 1:]])
-    count = len(vertices)
     graph = coo_array((np.ones(len(links), np.int8), links.T), shape=(count, count))
     label = connected_components(graph, directed=False)[1]
-    component = np.unique(label[faces[:, 0]], return_inverse=True)[1]
+    return np.unique(label[faces[:, 0]], return_inverse=True)[1]
+
+
+def _mesh(vertices: np.ndarray, faces: np.ndarray) -> Mesh:
+    """Return a surface with its connected components, each closed one turned outward."""
+    component = components(faces, len(vertices))
     closed = np.ones(int(component.max()) + 1, bool)
     _, face, uses = edges_of(faces)
     closed[component[face[uses != 2]]] = False

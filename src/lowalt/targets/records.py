@@ -15,7 +15,7 @@ from lowalt.files.csv_tables import read_csv
 from lowalt.files.errors import InputError, reading
 from lowalt.files.yaml_files import load_yaml
 from lowalt.targets import record_schema
-from lowalt.targets.make import SOURCES, source_module
+from lowalt.targets.make import source_module
 from lowalt.targets.record_schema import check_file_name, record_files
 
 COMMON_KEYS = tuple(record_schema.schema()["sources"][record_schema.COMMON]["properties"])
@@ -208,9 +208,6 @@ def merge(row: dict, record: dict, where: str) -> dict:
 
     Raises: InputError naming `where`, the key, the value and what was expected.
     """
-    source = record.get("source")
-    if source not in SOURCES:
-        raise InputError(f"{where}: source is {source!r}, expected one of {SOURCES}")
     merged = {"rcs_m2_per_point": 1.0, "points": row["points_in_published_cloud_approx"], **record}
     merged |= {
         "subtype": row["name"],
@@ -225,6 +222,7 @@ def merge(row: dict, record: dict, where: str) -> dict:
         raise InputError(
             f"{where}: row_from names {unknown}, expected columns of the table of targets"
         )
+    source = merged["source"]
     own = {key: value for key, value in record.items() if key not in COMMON_KEYS}
     merged |= record_schema.check(source, own, where)
     for name in record_files(merged):

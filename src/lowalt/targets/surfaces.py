@@ -191,9 +191,7 @@ def cylinder(
     return tube(np.array([bottom, top], float), radius, sides)
 
 
-def hull(
-    stations: Iterable[tuple], exponent: float = 2.5, sides: int = 24, bow: float = 0.0
-) -> Surface:
+def hull(stations: Iterable[tuple], exponent: float, sides: int = 24, bow: float = 0.0) -> Surface:
     """Return a body along y from stations (y, half_width, z_low, z_high), its ends closed.
 
     Sections are superellipses. `bow` shifts both tips outward along y by that length, which rounds
@@ -212,15 +210,13 @@ def hull(
     return loft(sections, tips)
 
 
-def box(
-    size: Iterable[float], centre: Iterable[float] = (0, 0, 0), exponent: float = 8.0
-) -> Surface:
+def box(size: Iterable[float], centre: Iterable[float] = (0, 0, 0)) -> Surface:
     """Return a box with the edge lengths `size` (x, y, z).
 
     The superellipse's exponent rounds its edges along y.
     """
     x, y, z = (float(value) / 2 for value in size)
-    return hull([(-y, x, -z, z), (y, x, -z, z)], exponent).moved(centre)
+    return hull([(-y, x, -z, z), (y, x, -z, z)], 8.0).moved(centre)
 
 
 def ring(profile: np.ndarray, sides: int = 32) -> Surface:
@@ -256,7 +252,7 @@ def airfoil(chord: float, thickness: float, panels: int = 6) -> np.ndarray:
     return np.stack([chord / 4 - loop[:, 0], loop[:, 1]], 1)
 
 
-def foil(stations: Iterable[tuple], thickness: float = 0.12) -> Surface:
+def foil(stations: Iterable[tuple], thickness: float) -> Surface:
     """Return a wing or blade along +x from stations (x, y, z, chord, twist).
 
     Sections are airfoils, and the ends are closed. (x, y, z) is the quarter-chord point, the chord
@@ -336,7 +332,7 @@ def sample_faces(
 
 
 def thin(
-    points: np.ndarray, count: int, rng: np.random.Generator, keep: np.ndarray | Sequence = ()
+    points: np.ndarray, count: int, rng: np.random.Generator, keep: np.ndarray | Sequence
 ) -> np.ndarray:
     """Return the indices of `count` points spread as evenly as can be, in the order chosen.
 

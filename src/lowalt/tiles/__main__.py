@@ -95,14 +95,14 @@ def _cubes(
     settings: {seed, tolerance, effects, snr_db}.
     """
     from lowalt.motion import read_table
-    from lowalt.targets.cloud import read
+    from lowalt.targets.cloud import read_clouds
     from lowalt.targets.occluders import read_all
     from lowalt.tiles.cubes import Cubes
 
     rows = read_table(options.motion)
     snrs = settings.pop("snr_db")
     stations = tiles.network.stations
-    clouds = {cloud.subtype: cloud for cloud in map(read, options.clouds)}
+    clouds = read_clouds(options.clouds)
     scene = settings | {"network": options.settings["network"]}
     maker = Cubes.from_settings(scene, clouds, read_all(options.occluders))
 

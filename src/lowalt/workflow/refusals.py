@@ -13,7 +13,7 @@ from lowalt.config.brought import OF_TRAINING, refuse_brought
 from lowalt.config.classes import AIRBORNE, CATEGORIES
 from lowalt.config.layers import plain
 from lowalt.config.named_code import file_and_function, file_of, own_effects
-from lowalt.config.network import SPEED_OF_LIGHT, Network, masts_m, station_names
+from lowalt.config.network import SPEED_OF_LIGHT, masts_m, station_names
 from lowalt.files.atomic import slug
 from lowalt.files.errors import InputError
 from lowalt.files.shipped import SHIPPED, as_named
@@ -54,14 +54,12 @@ def refuse_braces(config: dict, inputs: str | None) -> None:
             raise InputError(f"{name}: {path!r}, expected a path without braces")
 
 
-def refuse_scene(config: dict, network: Network, subtypes: Collection[str]) -> None:
+def refuse_scene(config: dict, subtypes: Collection[str]) -> None:
     """Refuse effects that do not fit one another, the run's subtypes or added SNRs.
 
     The noise of added SNRs must not be part of the echoes.
     """
-    links = any(station.transmitter is not None for station in network.stations)
-    if config["effects"] or links or network.guard_subcarriers < 0:
-        check(config, shows_all_cells(config))
+    check(config, shows_all_cells(config))
     refuse_unknown_subtypes(config["effects"], subtypes)
     adds_snrs = any("snr_db" in step for step in config.get("added", []))
     noisy = in_all_cells(config["effects"])

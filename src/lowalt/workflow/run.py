@@ -61,7 +61,7 @@ class Run:
         Images.from_settings(config["images"])
         refusals.refuse_contradictions(config, published, classes)
         schemes = refusals.schemes_of(config)
-        refusals.refuse_scene(config, network, chosen)
+        refusals.refuse_scene(config, chosen)
         refusals.refuse_no_files(config["targets"], inputs)
         lacking = missing_inputs(chosen, inputs)
         if lacking:

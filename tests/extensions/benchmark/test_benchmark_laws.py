@@ -46,7 +46,6 @@ def test_nineteen_of_twenty_known_samples_are_accepted_where_the_held_out_ones_a
         {"probabilities": np.stack([1 - scores, scores], 1), "label": np.repeat([0, 1], [100, 4])},
     )
     assert scoring.rejected_share(part, 1) == 0.75
-    assert scoring.rejected_share(part, 1, 0.5) == 1.0
 
 
 def test_the_open_set_never_trains_on_its_held_out_class():

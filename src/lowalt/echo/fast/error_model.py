@@ -64,7 +64,7 @@ def array_gains(radar: Radar) -> ArrayGains:
     )
 
 
-def round_up(value: float, steps: int = 2) -> float:
+def round_up(value: float, steps: int) -> float:
     """Return `value` rounded up to one of `steps` values an octave.
 
     Few polynomials then serve all samples.

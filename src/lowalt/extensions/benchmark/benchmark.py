@@ -5,8 +5,7 @@ import sys
 from pathlib import Path
 
 from lowalt.commands import workflow
-from lowalt.commands.command_line import Answer, add_command
-from lowalt.commands.command_table import COMMANDS
+from lowalt.commands.command_line import Answer, add_command, add_group
 from lowalt.config.command import add_backbone_option
 from lowalt.extensions.benchmark import baseline_table, frozen_bytes, submitted_rows
 from lowalt.extensions.benchmark.baselines import kept
@@ -29,8 +28,7 @@ EXAMPLE = "lowalt benchmark score predictions.csv --track unseen"
 
 def add_to(commands: argparse._SubParsersAction, name: str) -> None:
     """Add `benchmark` and its own commands to a parser's commands."""
-    about = commands.add_parser(name, help=COMMANDS[name].meaning, epilog=f"example: {EXAMPLE}")
-    own = about.add_subparsers(metavar="COMMAND", required=True)
+    own = add_group(commands, name)
     add_command(
         own,
         "tracks",

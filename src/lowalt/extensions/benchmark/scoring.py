@@ -115,15 +115,15 @@ def headline(track: Track, found: Values) -> Interval:
     return Interval(value, max(low, 0.0), min(high, 100.0))
 
 
-def rejected_share(part: Predictions, label: int, accepted: float = 0.95) -> float:
+def rejected_share(part: Predictions, label: int) -> float:
     """Return the share of the held-out class that is rejected.
 
-    The threshold accepts a share `accepted` of the samples of trained classes. label: of the
+    The threshold accepts 95 % of the samples of trained classes. label: of the
     held-out class.
     """
     scores = part.probabilities[:, label]
     held_out = part.label == label
-    return float(np.mean(scores[held_out] > np.quantile(scores[~held_out], accepted)))
+    return float(np.mean(scores[held_out] > np.quantile(scores[~held_out], 0.95)))
 
 
 def scores(track: Track, answers: list[np.ndarray], baselines: dict[str, np.ndarray]) -> dict:

@@ -7,8 +7,7 @@ from pathlib import Path
 
 import yaml
 
-from lowalt.commands.command_line import Answer, add_command
-from lowalt.commands.command_table import COMMANDS
+from lowalt.commands.command_line import Answer, add_command, add_group
 from lowalt.extensions.drafting.data_sheet import add_sheets
 from lowalt.extensions.drafting.inspection import Inspection, described, inspect_mesh
 from lowalt.extensions.drafting.new import SEED, Asked, draft
@@ -43,52 +42,59 @@ def _unit(text: str) -> str | float:
 
 
 def add_to(commands: argparse._SubParsersAction, name: str) -> None:
-    """Add `target` and its four commands to a parser's commands."""
-    _, meaning, example = COMMANDS[name]
-    target = commands.add_parser(name, help=meaning, epilog=f"example: {example}")
-    actions = target.add_subparsers(dest="action", required=True)
+    """Add `target` and its commands to a parser's commands."""
+    actions = add_group(commands, name)
+    _add_inspect(actions)
+    _add_new(actions)
+    _add_make(actions)
+    add_sheets(actions)
+    meaning = "picture of a cloud with axes, hinges, normals, its motion and its spectra"
+    example = "lowalt target show results/default/clouds/crow.npz --out crow.png"
+    show = add_command(actions, "show", _show, meaning, example)
+    show.add_argument("cloud", type=Path)
+    show.add_argument("--out", type=Path, help="picture to write (default: the cloud's name, .png)")
+
+
+def _add_inspect(actions: argparse._SubParsersAction) -> None:
+    """Add `inspect` with its options."""
     meaning = "unit, sizes, pieces and possible moves of a mesh file, and a picture"
-    inspect = add_command(
-        actions, "inspect", _inspect, meaning, "lowalt target inspect inputs/mydrone.stl"
-    )
-    inspect.add_argument("--category", choices=KINDS, help="default: that of --subtype, or UAV")
-    inspect.add_argument(
+    example = "lowalt target inspect inputs/mydrone.stl"
+    line = add_command(actions, "inspect", _inspect, meaning, example)
+    line.add_argument("--category", choices=KINDS, help="default: that of --subtype, or UAV")
+    line.add_argument(
         "--subtype", help="the published target that it is: its size tells the unit, as for `new`"
     )
-    inspect.add_argument(
+    line.add_argument(
         "--out",
         type=Path,
         help="picture to write (default: the file's name and -inspect.png, here)",
     )
+    _add_mesh(line)
+    _add_table(line)
+
+
+def _add_new(actions: argparse._SubParsersAction) -> None:
+    """Add `new` with its options."""
     meaning = "draft a record of a mesh or a robot's description; figures to confirm are marked"
     example = (
         'lowalt target new inputs/mydrone.stl --subtype "DJI Mini 2" --inputs inputs '
         "--out mine.yaml"
     )
-    new = add_command(actions, "new", _new, meaning, example)
-    new.add_argument(
+    line = add_command(actions, "new", _new, meaning, example)
+    line.add_argument(
         "--subtype",
         help="the published target whose place it takes; another name (default: the file's) "
         "makes a row of its own",
     )
-    new.add_argument("--category", choices=KINDS, help="of a target with a row of its own")
-    for line in (inspect, new):
-        line.add_argument(
-            "file", type=Path, help="mesh, or for `new` a robot's description: URDF, SDF or MJCF"
-        )
-        line.add_argument(
-            "--unit", type=_unit, help="unit of the file's numbers: m, cm, mm, in, ft or metres"
-        )
-        line.add_argument(
-            "--size", type=float, dest="size_m", help="largest extent of the target (m), not --unit"
-        )
+    line.add_argument("--category", choices=KINDS, help="of a target with a row of its own")
+    _add_mesh(line)
     for axis in ("up", "front"):
-        new.add_argument(
+        line.add_argument(
             f"--{axis}",
             choices=AXES,
             help=f"axis of the file that points {axis}; --{axis}=-y for a minus",
         )
-    new.add_argument(
+    line.add_argument(
         "--rotors",
         "--wheels",
         type=int,
@@ -96,37 +102,58 @@ def add_to(commands: argparse._SubParsersAction, name: str) -> None:
         metavar="N",
         help="number of its rotors or wheels, 0 for none",
     )
-    new.add_argument(
+    line.add_argument(
         "--moving",
         nargs="+",
         metavar="NUMBER",
         help="pieces that turn, numbered as in the picture; 5+6 "
         "for two that are one rotor or wheel",
     )
-    new.add_argument("--out", type=Path, help="record file to write (default: print it)")
+    line.add_argument("--out", type=Path, help="record file to write (default: print it)")
+    _add_table(line)
+    _add_inputs(line)
+
+
+def _add_make(actions: argparse._SubParsersAction) -> None:
+    """Add `make` with its options."""
     example = "lowalt target make mydrone.yaml --inputs inputs"
-    make = add_command(actions, "make", _make, "one record to one cloud and a picture", example)
-    make.add_argument("record", type=Path, help="YAML file of records")
-    make.add_argument("--subtype", help="which record of the file (default: its only one)")
-    make.add_argument("--seed", type=int, default=SEED)
-    make.add_argument("--out", type=Path, help="cloud file to write (default: SUBTYPE.npz)")
-    for line in (inspect, new, make):
-        line.add_argument(
-            "--table", type=Path, default=TABLE, help="table of targets (default: the package's)"
-        )
-    for line in (new, make):
-        line.add_argument(
-            "--inputs",
-            type=Path,
-            default=Path(os.environ.get("LOWALT_INPUTS", ".")),
-            help="folder that a record's files are in (default: $LOWALT_INPUTS or .)",
-        )
-    add_sheets(actions)
-    meaning = "picture of a cloud with axes, hinges, normals, its motion and its spectra"
-    example = "lowalt target show results/default/clouds/crow.npz --out crow.png"
-    show = add_command(actions, "show", _show, meaning, example)
-    show.add_argument("cloud", type=Path)
-    show.add_argument("--out", type=Path, help="picture to write (default: the cloud's name, .png)")
+    line = add_command(actions, "make", _make, "one record to one cloud and a picture", example)
+    line.add_argument("record", type=Path, help="YAML file of records")
+    line.add_argument("--subtype", help="which record of the file (default: its only one)")
+    line.add_argument("--seed", type=int, default=SEED)
+    line.add_argument("--out", type=Path, help="cloud file to write (default: SUBTYPE.npz)")
+    _add_table(line)
+    _add_inputs(line)
+
+
+def _add_mesh(line: argparse.ArgumentParser) -> None:
+    """Add the mesh file and the options that say how large it is."""
+    line.add_argument(
+        "file", type=Path, help="mesh, or for `new` a robot's description: URDF, SDF or MJCF"
+    )
+    line.add_argument(
+        "--unit", type=_unit, help="unit of the file's numbers: m, cm, mm, in, ft or metres"
+    )
+    line.add_argument(
+        "--size", type=float, dest="size_m", help="largest extent of the target (m), not --unit"
+    )
+
+
+def _add_table(line: argparse.ArgumentParser) -> None:
+    """Add the option of the table of targets."""
+    line.add_argument(
+        "--table", type=Path, default=TABLE, help="table of targets (default: the package's)"
+    )
+
+
+def _add_inputs(line: argparse.ArgumentParser) -> None:
+    """Add the option of the folder of inputs."""
+    line.add_argument(
+        "--inputs",
+        type=Path,
+        default=Path(os.environ.get("LOWALT_INPUTS", ".")),
+        help="folder that a record's files are in (default: $LOWALT_INPUTS or .)",
+    )
 
 
 def _write(path: Path, data: bytes) -> Path:

@@ -24,6 +24,7 @@ from lowalt.recognition.runs import Trained, load, of_file
 from lowalt.recognition.samples import Samples
 
 LARGEST_BYTES = 1_000_000
+BATCH = 64
 FEWER_POINTS = 0.5
 """An entry that loses more of the validation accuracy, in percentage points, is not written."""
 
@@ -39,7 +40,7 @@ def small(content: ModelFile, trusted: str = "") -> ModelFile:
     return replace(content, tensors=rounded(content.tensors, matrices), weights=EIGHT)
 
 
-def held_against(exact: Trained, entry: Trained, samples: Samples, batch: int = 64) -> dict:
+def held_against(exact: Trained, entry: Trained, samples: Samples) -> dict:
     """Return how an entry answers samples next to the weights as trained.
 
     Both answer in float32, without mirroring.
@@ -50,7 +51,7 @@ def held_against(exact: Trained, entry: Trained, samples: Samples, batch: int = 
     machine = Machine(torch.device("cpu"), "fp32")
     everything = np.arange(len(samples.facts))
     as_trained, rounded_off = (
-        probabilities(model.model, samples, everything, machine, batch) for model in (exact, entry)
+        probabilities(model.model, samples, everything, machine, BATCH) for model in (exact, entry)
     )
     guesses = as_trained.argmax(1)
     changed_guesses = rounded_off.argmax(1)

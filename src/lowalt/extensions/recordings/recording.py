@@ -7,7 +7,7 @@ import math
 import shlex
 from pathlib import Path
 
-from lowalt.commands.command_line import Answer, add_command, positive
+from lowalt.commands.command_line import Answer, add_command, add_group, positive
 from lowalt.commands.command_table import COMMANDS
 from lowalt.extensions.recordings.file_inspection import FileInspection, Seen, inspect_recording
 from lowalt.files.atomic import write_file
@@ -27,14 +27,12 @@ WORDS = {
 
 def add_to(commands: argparse._SubParsersAction, name: str) -> None:
     """Add `recording` and its commands to a parser's commands."""
-    _, meaning, example = COMMANDS[name]
-    recording = commands.add_parser(name, help=meaning, epilog=f"example: {example}")
+    actions = add_group(commands, name)
     hertz = positive(1e15, "hertz, such as 24e9")
-    actions = recording.add_subparsers(dest="action", required=True)
     meaning = (
         "layouts that fit the file's bytes, the best first, a picture, and a draft of its record"
     )
-    inspect = add_command(actions, "inspect", _inspect, meaning, example)
+    inspect = add_command(actions, "inspect", _inspect, meaning, COMMANDS[name].example)
     inspect.add_argument(
         "file",
         type=Path,

@@ -14,6 +14,7 @@ from scipy.spatial import ConvexHull
 from lowalt.files.errors import InputError
 from lowalt.numerics import portable
 from lowalt.scene import rays
+from lowalt.targets.mesh_files import components
 
 GRID_M = 1e-3
 """Corners in the same cell of this grid are one corner.
@@ -300,11 +301,8 @@ def _ridges(
 
     The latter are the building (F,) of each triangle.
     """
-    links = np.concatenate([numbers[:, :2], numbers[:, 1:]])
     size = int(numbers.max()) + 1
-    graph = coo_array((np.ones(len(links), np.int8), links.T), shape=(size, size))
-    connected = connected_components(graph, directed=False)[1]
-    building = np.unique(connected[numbers[:, 0]], return_inverse=True)[1]
+    building = components(numbers, size)
     edges, triangle_of = _edges(numbers)
     of_facet = np.column_stack([edges, label[triangle_of]])
     _, which = np.unique(of_facet, axis=0, return_inverse=True)

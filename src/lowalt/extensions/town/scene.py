@@ -8,8 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.commands.command_line import Answer, add_command
-from lowalt.commands.command_table import COMMANDS
+from lowalt.commands.command_line import Answer, add_command, add_group
 from lowalt.files.errors import InputError
 
 EXAMPLE = "lowalt scene inspect town.geojson --origin 11.575 48.137"
@@ -17,9 +16,7 @@ EXAMPLE = "lowalt scene inspect town.geojson --origin 11.575 48.137"
 
 def add_to(commands: argparse._SubParsersAction, name: str) -> None:
     """Add `scene` and its two commands to a parser's commands."""
-    _, meaning, example = COMMANDS[name]
-    scene = commands.add_parser(name, help=meaning, epilog=f"example: {example}")
-    actions = scene.add_subparsers(dest="action", required=True)
+    actions = add_group(commands, name)
     meaning = "size, walls and materials of a town, what was left out, and a plan with the stations"
     inspect = add_command(actions, "inspect", _inspect, meaning, EXAMPLE)
     inspect.add_argument(

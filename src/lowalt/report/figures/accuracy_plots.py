@@ -14,7 +14,7 @@ from lowalt.report.plots import NARROW_IN, Plot, drawn
 PAGE_WIDTH = 960
 CELL = 46
 """Width of the page's column, and of a cell of a matrix, in pixels; 100.0 fits into a cell."""
-SOURCES = {"this run": "-", "paper": "--"}
+SOURCES: dict = {"this run": "-", "paper": "--"}
 """Style of the lines of each source."""
 
 
@@ -114,8 +114,8 @@ def confusion(counts: dict, categories: tuple[str, ...], narrow: bool = False) -
             for column, guess in enumerate(categories):
                 percent = shares[line][column]
                 shown = f"{percent:.1f}" if total else "-"
-                ink = {"color": "white" if percent > 50 else "0.2", "ha": "center", "va": "center"}
-                panel.text(column + 0.5, line + 0.5, shown, **ink)
+                ink = "white" if percent > 50 else "0.2"
+                panel.text(column + 0.5, line + 0.5, shown, color=ink, ha="center", va="center")
                 rows.append(
                     {
                         "panel": f"{protocol}: {scheme}",

@@ -151,7 +151,7 @@ def echo(measured: list[dict[str, str]], narrow: bool = False) -> Plot:
     A line joins the numbers of points. measured: rows of cost.csv (keys ECHO); narrow: for
     telephones.
     """
-    rows = [
+    rows: list[dict] = [
         {
             "method": row["method"],
             "name": ", ".join(filter(None, (row["method"], row["tolerance"]))),

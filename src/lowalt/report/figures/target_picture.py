@@ -1,7 +1,5 @@
 """Pictures of one target: its points with hinges and axes, its motion over a cycle, its spectra."""
 
-from pathlib import Path
-
 import numpy as np
 from matplotlib import pyplot as plt
 
@@ -32,6 +30,7 @@ GREY = (0.55, 0.55, 0.58, 1.0)
 """Colour of the body, RGBA."""
 FLOOR_DB = -40.0
 CONFIG = SHIPPED / "config/default.yaml"
+SEED = 1
 
 
 def _colours(cloud: Cloud) -> np.ndarray:
@@ -116,12 +115,12 @@ def _marks(
         )
 
 
-def _motion_row(cloud: Cloud, config: dict, seed: int) -> dict:
+def _motion_row(cloud: Cloud, config: dict) -> dict:
     """One motion model of the target, drawn as the motion stage draws them."""
     masts = np.array(masts_m(config["network"]))
     corners = region_polygon(masts, config["motion"]["region"]["polygon_m"])
     row = draw(
-        stream(seed, "show", cloud.subtype),
+        stream(SEED, "show", cloud.subtype),
         cloud,
         cloud.record["published"],
         masts,
@@ -223,7 +222,7 @@ def _instants(panels, cloud: Cloud, row: dict) -> None:
         panel.set(title=f"{view[0]}, {1000 * step / STEPS * length:.4g} of {1000 * length:.4g} ms")
 
 
-def target_picture(cloud: Cloud, config_path: Path = CONFIG, seed: int = 1) -> bytes:
+def target_picture(cloud: Cloud) -> bytes:
     """Return a PNG of a cloud: three views, the target at four instants, and spectra.
 
     Views are in metres with hinges, axes and normals; the instants are of a cycle, with the paths
@@ -232,13 +231,13 @@ def target_picture(cloud: Cloud, config_path: Path = CONFIG, seed: int = 1) -> b
     The motion model is drawn as the workflow draws them, for the network of the configuration.
     Raises: InputError where there is no such configuration, or the target's motion cannot be drawn.
     """
-    config = load_yaml(config_path)
-    row = _motion_row(cloud, config, seed)
+    config = load_yaml(CONFIG)
+    row = _motion_row(cloud, config)
     figure = plt.figure(figsize=(14, 13), layout="constrained")
-    views, instants, spectra = (
-        row_of.subplots(1, count)
-        for row_of, count in zip(figure.subfigures(3, 1), (3, 4, 3), strict=True)
-    )
+    top, middle_row, bottom = figure.subfigures(3, 1, squeeze=False)[:, 0]
+    views = top.subplots(1, 3)
+    instants = middle_row.subplots(1, 4)
+    spectra = bottom.subplots(1, 3)
     points = cloud.track[0] if len(cloud.track) else cloud.points
     middle, half = _limits(points)
     for panel, view in zip(views, DIRECTIONS, strict=True):

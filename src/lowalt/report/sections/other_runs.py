@@ -1,20 +1,7 @@
 """Section: models of other runs on this run's test samples."""
 
+from lowalt.recognition.transfer import COLUMNS
 from lowalt.report.reported_run import ReportedRun
-
-COLUMNS = (
-    "protocol",
-    "scheme",
-    "trained_on",
-    "snr_db",
-    "accuracy_percent",
-    "own_percent",
-    "difference_points",
-    "low",
-    "high",
-    "seeds",
-    "spread_points",
-)
 
 
 def values(run: ReportedRun) -> dict | None:

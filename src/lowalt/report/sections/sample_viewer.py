@@ -8,7 +8,7 @@ from lowalt.report import viewer
 from lowalt.report.reported_run import ReportedRun
 from lowalt.shards import ShardSet
 from lowalt.shards.remake import Remaker, opened
-from lowalt.targets.cloud import read
+from lowalt.targets.cloud import read_clouds
 
 
 def viewed(
@@ -30,7 +30,7 @@ def viewed(
 
 def values(run: ReportedRun) -> dict:
     """Return the viewer's samples, the panels of a tile, and the sizes of images."""
-    clouds = {cloud.subtype: cloud for cloud in map(read, run.inputs.paths("clouds"))}
+    clouds = read_clouds(run.inputs.paths("clouds"))
     files = run.inputs.paths("predictions")
     groups = {name: row["unseen_protocol"] for name, row in run.targets.items()}
     unseen = {slug(name) for name, group in groups.items() if group == "unseen"}

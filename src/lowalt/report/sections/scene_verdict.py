@@ -17,7 +17,7 @@ def values(run: ReportedRun) -> dict:
     inputs = run.config["inputs"] or os.environ.get("LOWALT_INPUTS")
     try:
         scene = explanation.scene_of(run.config)
-        chosen = explanation.samples(run.config, inputs and Path(inputs), [])
+        chosen = explanation.samples(run.config, Path(inputs) if inputs else None, [])
     except InputError as error:
         # Show the page without the verdict where, for example, the recordings have been moved.
         return {"lines": [f"not explained: {error}"]}

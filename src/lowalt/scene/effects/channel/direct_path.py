@@ -8,9 +8,8 @@ side lobes of both arrays, whose beams point at the target.
 
 import numpy as np
 
-from lowalt.files.errors import InputError
 from lowalt.numerics.portable import norm
-from lowalt.scene.checks import CheckedScene
+from lowalt.scene.checks import CheckedScene, between_stations
 from lowalt.scene.crossing import crossing
 from lowalt.scene.view import Still, View
 
@@ -26,10 +25,7 @@ STILL = True
 
 def check(settings: dict, scene: CheckedScene) -> None:
     """Raise InputError for a network without links."""
-    if all(station.transmitter is None for station in scene.network.stations):
-        raise InputError(
-            "effects.direct_path: no station of the network is a link, expected {transmit, receive}"
-        )
+    between_stations("direct_path", scene.network)
 
 
 def levels(settings: dict, view: View) -> list[tuple[str, float, str]]:

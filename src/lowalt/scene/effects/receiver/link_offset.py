@@ -8,8 +8,7 @@ offsets. A station that receives its own signal has none.
 import numpy as np
 
 from lowalt.config.network import Network, Station
-from lowalt.files.errors import InputError
-from lowalt.scene.checks import CheckedScene
+from lowalt.scene.checks import CheckedScene, between_stations
 from lowalt.scene.laws.offsets import delayed, of_stations, risen
 from lowalt.scene.view import Displacement, View
 from lowalt.scene.waveform import Look, oscillator_hz
@@ -27,10 +26,7 @@ UNMODELLED = ("fmcw", "cw")
 
 def check(settings: dict, scene: CheckedScene) -> None:
     """Raise InputError for a network without links."""
-    if all(station.transmitter is None for station in scene.network.stations):
-        raise InputError(
-            "effects.link_offset: no station of the network is a link, expected {transmit, receive}"
-        )
+    between_stations("link_offset", scene.network)
 
 
 def receive(
