@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import yaml
 
-from dataset import CONFIG, SEED, SNRS, build
+from dataset import CONFIG, SEED, SNRS, build, motion_rows
 from hub_library import loaded
 from lowalt.config.network import Network
 from lowalt.files.errors import InputError
@@ -20,13 +20,17 @@ from lowalt.numerics.streams import stream
 from lowalt.scene.effects.transmitter import slow_time
 from lowalt.shards import ShardSet, clean
 from lowalt.shards.__main__ import main
+from lowalt.shards.build import write_run
 from lowalt.shards.card import main as card
+from lowalt.shards.dataset import Dataset
 from lowalt.shards.index import build as build_index
 from lowalt.shards.sample_record import npy, row_of
 from lowalt.shards.sample_table import map_samples
 from lowalt.shards.verify import faults
 from lowalt.shards.write import ChunkSamples, write_shard
 from pictures import NETWORK
+from small_configuration import configuration
+from stage_runs import check_members
 
 STATIONS = list(NETWORK["stations"])
 
@@ -155,8 +159,6 @@ def test_each_motion_model_is_stored_once(recipes, noised):
 
 
 def test_splits_by_sample_give_each_fold_its_own_levels(tmp_path):
-    from dataset import motion_rows
-
     rows = motion_rows("unseen")
     split = {"by": "sample", "train": 2, "val": 1, "test": 1}
     echoes = np.ones((3, 400), np.complex64)
@@ -175,8 +177,6 @@ def test_splits_by_sample_give_each_fold_its_own_levels(tmp_path):
 
 
 def test_powers_of_a_scene_with_effects_set_the_noise(tmp_path):
-    from dataset import motion_rows
-
     rows = [row | {"fold": "train"} for row in motion_rows("unseen", 1)]
     echoes = np.full((3, 1, 400), 1 + 1j, np.complex64)
     powers = np.array([[1e-3], [2.0], [0.0]])
@@ -204,37 +204,17 @@ def test_powers_of_a_scene_with_effects_set_the_noise(tmp_path):
         clean.unpacked(entry, 8.0)
 
 
-def test_a_scene_with_a_canceller_gives_the_samples_of_its_signal_shards(tmp_path):
-    from test_dataset import configuration
-
-    from lowalt.shards.build import write_run
-    from lowalt.shards.dataset import Dataset
-
-    effects = {
-        "ground_reflection": {"permittivity": 5.24, "conductivity_s_m": 0.16},
-        "canceller": {"kind": "mean"},
-    }
-    config = configuration(effects=effects)
-    config["echo"] = {**config["echo"], "tolerance": 1e-3}
-    config["targets"] = {**config["targets"], "select": ["Owl"]}
-    config["motion"] = {**config["motion"], "models": 4}
+def test_noise_passes_the_canceller_of_a_scene_and_noise_that_effects_add_is_refused(tmp_path):
+    config = configuration(effects={"canceller": {"kind": "mean"}})
+    config["targets"]["select"] = ["Owl"]
     scene = Dataset(config)
-    for kind in ("signal", "recipe"):
-        write_run(scene, tmp_path / kind, kind)
-    stored, packed = (
-        ShardSet(tmp_path / kind / "shards" / "index.json") for kind in ("signal", "recipe")
-    )
-    assert len(stored) == 8 and [stored.members(n) for n in range(8)] == [
-        packed.members(n) for n in range(8)
-    ]
+    write_run(scene, tmp_path, "recipe")
+    check_members(scene, ShardSet(tmp_path / "shards/index.json"))
     with pytest.raises(InputError, match="cell_noise"):
         clean.refuse({"cell_noise": {}})
-    clean.refuse(effects)
 
 
 def test_damage_is_named_with_every_sample_that_it_reaches(published, tmp_path):
-    import shutil
-
     folder = shutil.copytree(published, tmp_path / "copy")
     assert list(faults(folder / "index.json")) == []
     rows = map_samples(folder / "seen-train-00000.npz")
