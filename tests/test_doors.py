@@ -199,8 +199,14 @@ def zoo(doors):
     (doors / "results/zoo").symlink_to(SHIPPED / "results/zoo")
 
 
-@pytest.mark.parametrize("attack", [*CODE, *PLACES])
-@pytest.mark.parametrize("entry", ENTRIES)
+ALIKE = ("an effect beside the run", "the table of targets by a link", "a flight log")
+"""Attacks that every entry is given: code, a file that is read early and one that is read late."""
+PAIRS = {(entry, attack) for entry in ENTRIES for attack in ALIKE} | {
+    ("Dataset", attack) for attack in CODE | PLACES
+}
+
+
+@pytest.mark.parametrize(("entry", "attack"), sorted(PAIRS))
 def test_a_run_s_configuration_names_no_code_and_no_file_outside(doors, zoo, entry, attack, capsys):
     path = brought(doors, (CODE | PLACES)[attack])
     told = held(lambda: ENTRIES[entry](path), capsys)
