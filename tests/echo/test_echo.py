@@ -139,16 +139,6 @@ def test_crossing_a_cell_edge_turns_the_phase_by_almost_pi():
     assert abs(before) == pytest.approx(abs(after), rel=1e-4)
 
 
-@pytest.mark.parametrize("count", [1, 2, 16, 25, 256])
-def test_chebyshev_limits(count):
-    from lowalt.echo.pointwise.terms import dirichlet
-
-    for whole in range(-3, 4):
-        sign = (-1.0) ** (whole * (count - 1))
-        assert dirichlet(float(whole), count) == sign * count
-        assert dirichlet(whole + 1e-9, count) == pytest.approx(sign * count, rel=1e-12)
-
-
 def test_the_command_s_memory_grows_by_its_output_alone():
     from craft import craft, row
     from lowalt.echo.chunk import clean_signals

@@ -175,15 +175,6 @@ print((found == written).all())
 """
 
 
-def test_products_of_complex_numbers_are_fused_in_no_kernel_that_is_done_as_written(tmp_path):
-    # numba compiles such a product once for all kernels, with the options of the first one.
-    (tmp_path / "products.py").write_text(PRODUCTS)
-    ended = subprocess.run(
-        [sys.executable, "products.py"], cwd=tmp_path, capture_output=True, text=True
-    )
-    assert ended.stdout == "True\n", ended.stderr
-
-
 SHARED = """
 import platform
 import numpy as np
@@ -210,14 +201,6 @@ written = (a.real * b.real - a.imag * b.imag) + 1j * (a.real * b.imag + a.imag *
 fuses = platform.machine() != "x86_64" or "+fma" in cpu_target.target_context.codegen().magic_tuple()[2]
 print((found == written).all() != fuses)
 """
-
-
-def test_plain_numba_still_compiles_a_product_once_for_all_kernels(tmp_path):
-    (tmp_path / "shared.py").write_text(SHARED)
-    ended = subprocess.run(
-        [sys.executable, "shared.py"], cwd=tmp_path, capture_output=True, text=True
-    )
-    assert ended.stdout == "True\n", ended.stderr
 
 
 CALLED = """
@@ -253,15 +236,18 @@ for kind in (INNER, LEAN, PLAIN, VECTOR):
 """
 
 
-def test_a_function_done_as_written_stays_so_for_a_first_caller_that_may_fuse(tmp_path):
-    # An option that a function does not give, numba takes from the function that calls it first.
-    # The last kind is a
-    # control: it is fused where the processor has such instructions.
-    (tmp_path / "called.py").write_text(CALLED)
+@pytest.mark.parametrize(("program", "kinds"), [(PRODUCTS, 1), (SHARED, 1), (CALLED, 4)])
+def test_products_are_fused_in_no_kernel_that_is_done_as_written(program, kinds, tmp_path):
+    """numba compiles such a product once for all kernels, with the options of the first one, and
+    takes an option that a function does not give from the function that calls it first. Its own
+    kernels, and the last kind of those that are called, are controls: they are fused where the
+    processor has such instructions.
+    """
+    (tmp_path / "products.py").write_text(program)
     ended = subprocess.run(
-        [sys.executable, "called.py"], cwd=tmp_path, capture_output=True, text=True
+        [sys.executable, "products.py"], cwd=tmp_path, capture_output=True, text=True
     )
-    assert ended.stdout == "True\n" * 4, ended.stderr
+    assert ended.stdout == "True\n" * kinds, ended.stderr
 
 
 def test_the_key_of_kept_code_has_the_kernel_s_own_options():

@@ -22,7 +22,6 @@ from lowalt.targets.surfaces import (
     foil,
     hull,
     inside,
-    loft,
     merged,
     ring,
     sample_faces,
@@ -83,15 +82,6 @@ def test_volumes_tend_to_the_formulas():
     # Pappus: area of the section times the way of its centroid.
     torus = ring(superellipse(0.1, 0.1, sides=200) + np.array([2, 0]), sides=200)
     assert volume(torus) == pytest.approx(np.pi * 0.01 * 2 * np.pi * 2, rel=1e-3)
-
-
-def test_a_unit_cube_from_a_loft():
-    square = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.0]])
-    cube = loft(np.stack([square, square + np.array([0, 0, 1])]))
-    assert volume(cube) == pytest.approx(1.0, abs=1e-15)
-    np.testing.assert_array_equal(
-        inside(cube, np.array([[0.5, 0.5, 0.5], [1.5, 0.5, 0.5], [0.9, 0.1, 0.2]])), [1, 0, 1]
-    )
 
 
 def test_merging_keeps_volumes_and_hollows():
