@@ -28,6 +28,7 @@ from lowalt.recognition.dataset_samples import opened
 from lowalt.recognition.recogniser import backbone
 from lowalt.shards import ShardSet, index
 from lowalt.shards.build import main as build_shards
+from lowalt.shards.remake import Remaker
 from lowalt.targets.records import load_table, with_row
 from lowalt.workflow.refusals import refuse_input
 
@@ -376,7 +377,7 @@ def test_an_index_whose_images_need_the_instants_of_an_effect_runs_no_effect(doo
     content["sha256"] = index._checksum(content)
     (folder / "index.json").write_text(json.dumps(content))
     shards = ShardSet(folder / "index.json")
-    for ask in (shards.tile, shards.late, shards.images):
+    for ask in (shards.tile, shards.late, shards.images, lambda _: Remaker(shards, {})):
         assert "is code, which a file may not choose" in held(lambda ask=ask: ask(0))
 
 

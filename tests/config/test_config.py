@@ -31,21 +31,12 @@ def test_every_shipped_configuration_is_valid(overlay):
             r"network.carrier_hz: value 4.9, expected at least 100000000",
         ),
         (
-            {"network": {"carrier_hz": "4.9 GHz"}},
-            r"network.carrier_hz: value '4.9 GHz', expected type number",
-        ),
-        ({"network": {"symbols": 0}}, r"network.symbols: value 0, expected at least 1"),
-        (
             {"network": {"stations": {"A": {"position_m": [0, 0]}}}},
             r"stations.A.position_m: .* at least 3 item",
         ),
-        ({"noise": {"snr_db": []}}, r"noise.snr_db: value \[\], expected at least 1 item"),
         ({"noise": {"snr_db": [3, 3]}}, r"noise.snr_db: .* every item once"),
-        ({"targets": {"select": ["Crow", "Crow"]}}, r"targets.select: .* every item once"),
-        ({"motion": {"region": {"polygn": 1}}}, r"motion.region: unknown key\(s\) \['polygn'\]"),
         ({"split": {"by": "model"}}, r"split.by: value 'model', expected one of"),
         ({"echo": {"tolerance": 0}}, r"echo.tolerance: value 0, expected more than 0"),
-        ({"echo": {"job": "all"}}, r"echo.job: value 'all', expected"),
         ({"run": "../x"}, r"run: value '../x', expected text like"),
         ({"run": "reference"}, r"run: value 'reference', expected none of"),
         (
@@ -60,7 +51,6 @@ def test_every_shipped_configuration_is_valid(overlay):
             {"noise": {"snr_db": ["a", "b"]}},
             r"refused: noise.snr_db.0: value 'a', expected number or inf$",
         ),
-        ({"noise": {"snr_db": [500]}}, r"noise.snr_db.0: value 500, expected at most 300$"),
         ({"network": {"stations": {1: {}}}}, r"key 1 among .*, expected text"),
         (
             {"network": {"stations": {"D": {"position_m": [1, 2, 3]}}}},

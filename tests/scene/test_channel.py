@@ -54,10 +54,10 @@ def facing(count: int, kinds=("body", "rotor")):
 
 
 def test_an_element_has_its_3db_widths_and_its_front_to_back():
-    element = Element(downtilt_deg=0.0)
     far = 1e5
 
-    def toward(azimuth_deg: float, up_deg: float) -> float:
+    def toward(azimuth_deg: float, up_deg: float, **changes: float) -> float:
+        element = Element(**{"downtilt_deg": 0.0, **changes})
         a = A.normal_rad + np.radians(azimuth_deg)
         u = np.radians(up_deg)
         away = far * np.array([np.cos(u) * np.cos(a), np.cos(u) * np.sin(a), np.sin(u)])
@@ -67,22 +67,9 @@ def test_an_element_has_its_3db_widths_and_its_front_to_back():
     for off in ((32.5, 0), (-32.5, 0), (0, 32.5), (0, -32.5)):
         assert toward(*off) == pytest.approx(5.0)
     assert toward(180, 0) == pytest.approx(-22.0)
-    element = Element(downtilt_deg=0.0, back_db=20.0)
-    assert toward(180, 0) == pytest.approx(-12.0) and toward(32.5, 0) == pytest.approx(5.0)
-    tilted = gain(
-        Element(downtilt_deg=10.0),
-        A,
-        np.array(A.position_m)
-        + far
-        * np.array(
-            [
-                np.cos(A.normal_rad) * np.cos(np.pi / 18),
-                np.sin(A.normal_rad) * np.cos(np.pi / 18),
-                -np.sin(np.pi / 18),
-            ]
-        ),
-    )
-    assert 10 * np.log10(tilted) == pytest.approx(8.0)
+    assert toward(180, 0, back_db=20.0) == pytest.approx(-12.0)
+    assert toward(32.5, 0, back_db=20.0) == pytest.approx(5.0)
+    assert toward(0, -10, downtilt_deg=10.0) == pytest.approx(8.0)
 
 
 def test_an_elements_pattern_weighs_both_ways():

@@ -175,11 +175,6 @@ def test_bad_skeletons_are_refused_by_file(files, old, new, names):
     [
         ({"max_mismatch_m": 0}, "max_mismatch_m: value 0"),
         ({"first_frame": 10, "last_frame": 11}, r"2 frames, 0.0167 s, expected at least 72"),
-        ({"last_frame": 60}, "60 frames"),
-        ({"first_frame": 0}, "first_frame"),
-        ({"rate_hz": "fast"}, "rate_hz"),
-        ({"last_frame": 1}, "last_frame"),
-        ({"scale": 2}, "scale"),
         ({"units": "inch"}, "units"),
         ({"motion": "n.amc"}, "n.amc"),
     ],

@@ -87,14 +87,9 @@ def test_a_later_file_replaces_whole_records(tmp_path, written):
         ({"source": "clay"}, r"Crow: source is 'clay', expected one of"),
         ({"colour": "black"}, r"Crow: record: unknown key\(s\) \['colour'\]"),
         ({"points": 0}, "Crow: points: value 0, expected at least 1"),
-        ({"points": True}, "Crow: points: value True"),
-        ({"like": "Boat"}, "Crow: like: value 'Boat', expected one of"),
-        ({"sources": {"maker": 1}}, r"Crow: sources\.maker: value 1, expected type string"),
-        ({"rcs_m2_per_point": -1}, "Crow: rcs_m2_per_point: value -1, expected at least 0"),
         ({"model": "plane"}, r"Crow: model is 'plane', expected one of \['bird'\]"),
         ({"size_is": "weight"}, r"Crow: size_is is 'weight', expected one of"),
         ({"flap": {"speed": 3}}, r"Crow: flap: unknown key\(s\) \['speed'\]"),
-        ({"flap": {"mean_deg": "up"}}, r"Crow: flap\.mean_deg: value 'up', expected type number"),
         ({"figures": {"length": [46, "cm", "reference"]}}, r"Crow: figures \[.*missing or unknown"),
         (
             {"coaxial": True},
@@ -117,18 +112,11 @@ def test_wrong_records_are_refused_by_key_and_value(tmp_path, written, change, m
             [46, "furlong", "reference"],
             r"length: unit is 'furlong', expected one of \['mm', 'cm', 'm'",
         ),
-        ("Crow", "length", [46, 1, "reference"], r"figures\.length: unit is '1'"),
         (
             "Crow",
             "length",
             [-46, "cm", "reference"],
             r"length: value is -46, expected a positive number",
-        ),
-        (
-            "Crow",
-            "length",
-            [float("nan"), "cm", "reference"],
-            r"length\.0: value nan, expected type number",
         ),
         (
             "Crow",
@@ -196,7 +184,6 @@ def test_wrong_figures_and_impossible_shapes_are_refused(
             {"coaxial": True},
             r"\['coaxial'\] are not for model folding, expected \[\] at most",
         ),
-        ("DJI Mini 2", {"points": 8}, "8 points for 5 parts leave none for the body"),
         ("Owl", {"points": 4}, "4 points for 5 parts leave none for the body"),
         (
             "Type-A Firefighting UAV",
@@ -242,7 +229,6 @@ def test_files_that_hold_no_records_or_one_twice_are_refused(tmp_path, text, mes
     [
         ("size_m", "size", r"columns \['size', 'size_m'\] missing or unknown"),
         ("0.2192", "-1", r"DJI Mini 2: size_m is '-1', expected a positive number"),
-        ("0.2192", "big", r"DJI Mini 2: size_m is 'big'"),
         ("UAV,1,", "4x4,1,", r"table of targets: category '4x4', expected a letter"),
         ("DJI Mini 4 Pro", "DJI Mini 2", r"DJI Mini 2: named twice"),
     ],
@@ -325,7 +311,6 @@ def test_a_single_record_replaces_that_of_its_subtype_alone_and_cells_of_its_row
     ("row", "message"),
     [
         ({"colour": "red"}, "expected cells of the columns"),
-        ([1], "expected cells of the columns"),
         ({"len_m": -1}, r"here: row: len_m is '-1', expected a positive number"),
         ({"speed_lo": -1}, r"here: row: speed_lo is '-1', expected a number of at least 0"),
         ({"category": "Vehicle", "unseen_protocol": "both"}, "seen or unseen"),
