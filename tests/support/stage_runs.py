@@ -73,6 +73,8 @@ def check_members(dataset: Dataset, stored: ShardSet) -> None:
     for number in range(len(dataset)):
         place = numbers[dataset.key(number)]
         assert dataset.members(number, stored.kind) == stored.members(place)
+        if stored.kind in ("signal", "recipe"):
+            assert (dataset.signal(number) == stored.signal(place)).all()
         record = stored.record(place)
         record.pop("cube", None)
         assert dataset.record(number) == record
