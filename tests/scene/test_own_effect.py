@@ -21,6 +21,7 @@ from lowalt.workflow.stages.noise import NoiseStage
 from lowalt.workflow.stages.shards import ShardsStage
 from lowalt.workflow.stages.tiles import TilesStage
 from scenes import network, scene, target
+from tables import rows
 
 HALF = """
 from pathlib import Path
@@ -67,23 +68,7 @@ def test_it_acts_behind_the_shipped_effects_of_its_place_with_a_stream_of_its_fi
 
 @pytest.mark.parametrize(
     ("block", "said"),
-    [
-        ({"gone.py": {}}, "no file 'gone.py'"),
-        (
-            {"half.py": {"shares": 1}},
-            r"half.py: unknown parameter\(s\) \['shares'\], expected some of",
-        ),
-        (
-            {"half.py": {"share": "much"}},
-            "half.py.share: 'much', expected a number as its default 0.5",
-        ),
-        ({"half.py": {"share": True}}, "half.py.share: 'True', expected a number"),
-        ({"half.py": {"share": float("nan")}}, "half.py.share: 'nan', expected a finite number"),
-        ({"half.py": {"names": "x"}}, "half.py.names: 'x', expected a list"),
-        ({"half.py": {"on": 1}}, "half.py.on: '1', expected true or false"),
-        ({"half.py": {}, "b/half.py": {}}, "expected files of different names"),
-        ({"halve": {}}, "unknown effect 'halve', expected .*Python file"),
-    ],
+    rows("own_effects", "settings"),
 )
 def test_settings_of_other_types_and_unknown_ones_are_refused_in_one_sentence(half, block, said):
     Path("b").mkdir()
@@ -95,20 +80,7 @@ def test_settings_of_other_types_and_unknown_ones_are_refused_in_one_sentence(ha
 
 @pytest.mark.parametrize(
     ("old", "new", "said"),
-    [
-        ("DEFAULTS =", "OTHERS =", "DEFAULTS is None, expected every parameter"),
-        ("SOURCE =", "ORIGIN =", "no SOURCE, expected a text"),
-        ("def visible", "def seen", r"offers \[\], expected functions of one place"),
-        ("(settings, view, rng)", "(settings, view)", r"expected visible\(settings, view, rng\)"),
-        (
-            "IDLE",
-            "def receive(settings, samples, look, rng): pass\nIDLE",
-            "expected functions of one place",
-        ),
-        ("SOURCE =", "1 / 0\nSOURCE =", "half.py: ZeroDivisionError: division by zero"),
-        ("SOURCE =", "SOURCE ==", "NameError"),
-        ("SOURCE =", "SOURCE = =", "SyntaxError"),
-    ],
+    rows("own_effects", "files"),
 )
 def test_a_file_that_does_not_keep_the_contract_is_refused_in_one_sentence(half, old, new, said):
     Path("half.py").write_text(HALF.replace(old, new))

@@ -19,6 +19,7 @@ from lowalt.scene.effects import ADDED, PLACES, called, dotted
 from lowalt.scene.observe import Scene, observe
 from lowalt.scene.view import Still
 from scenes import target
+from tables import rows
 
 STATIONS = {
     name: {"position_m": [x, 0.0, 10.0], "normal_deg": 0.0}
@@ -60,42 +61,7 @@ OF_OFDM = (
 GAPS = {"slow_time": {"downlink": 0.75}}
 
 
-USUAL = [
-    ({"fog": {}}, "unknown effect 'fog'"),
-    ({"adc": {"bit": 8}}, r"effects.adc: unknown parameter\(s\) \['bit'\]"),
-    ({"timing_offset": {"sigma_s": 1e-6}}, "effects.timing_offset: .*prefix_slack_s"),
-    ({"clock_offset": {"fixed_ppm": 1.0}}, "effects.clock_offset: .*prefix_slack_s"),
-    ({"clock_offset": {"sigma_ppm": 0.01}, "carrier_offset": {}}, "sigma_ppm is 0.01 .*the same"),
-    ({"carrier_offset": {}, "phase_noise": {}}, "shared: false"),
-    ({"phase_noise": {"points": [[10.0, 0.0], [1.0, 0.0]]}}, "phase_noise.points: .*rising"),
-    ({"transmit_leakage": {}, "phase_noise": {"shared": False}}, "phase_noise with shared: false"),
-    ({"link_offset": {}}, "effects.link_offset: no station .*is a link"),
-    ({"direct_path": {}}, "effects.direct_path: no station .*is a link"),
-    ({"cell_noise": {}, "receiver_noise": {}}, "cell_noise: .*expected one of them"),
-    ({"canceller": {}}, "canceller: there is no clutter"),
-    ({"clutter": {}, "canceller": {"kind": "clutter"}} | GAPS, "slow_time leaves gaps"),
-    ({"clutter": {}, "canceller": {"kind": "clutter", "carrier_hz": 28e9}}, "canceller.carrier_hz"),
-    ({"clutter": {"shape": 2.5}}, "clutter: shape is 2.5 for law weibull"),
-    ({"walls": {"facades": [[0, 0, 0, 0, 9]]}}, "walls.facades: .*expected positive"),
-    ({"reflected_aspect": {}, "occlusion": {}}, "reflected_aspect: there is no reflected route"),
-    ({"reflected_aspect": {}, "ground_reflection": {}}, "reflected_aspect: no side to follow"),
-    ({"fluctuation": {}, "cross_sections": {}}, "fluctuation: pattern is true"),
-    ({"companions": {"count": [3, 1]}}, "companions.count: .*smaller number first"),
-    ({"companions": {"subtypes": ["Crow"]}, "occlusion": {}}, "companions.subtypes: surfaces"),
-    ({"interference": {}}, "interference: the network has one station"),
-    ({"pointing_error": {"update_s": 1e-3}}, "pointing_error.update_s: 0.001, expected null or"),
-    ({"comb_pilots": {"spacing": 3}}, "comb_pilots.spacing: 3, expected a proper divisor"),
-    ({"comb_pilots": {"offset": 4}}, "comb_pilots.offset: 4, expected less than spacing"),
-    ({"slow_time": {"jitter_s": 2.5e-3}}, "slow_time.jitter_s: 0.0025, expected below"),
-    ({"slow_time": {"downlink": 1e-6, "tdd_period_s": 1.0}}, "slow_time: downlink 1e-06 .*more"),
-    ({"detector": {"gate_cells": 128}}, "detector.gate_cells: 128, expected less than half"),
-    ({"detector": {"training": 200}}, r"detector.guard \+ training: 202"),
-    ({"detector": {"range_window": "hann", "guard": 1}}, "detector.guard: 1, expected at least 2"),
-    (
-        {"cell_error": {"spread_cells": 128}},
-        "cell_error.spread_cells: 128, expected less than half",
-    ),
-]
+USUAL = rows("scenes", "usual")
 """Effects that one station without noise refuses."""
 
 

@@ -22,6 +22,7 @@ from lowalt.spectra import (
     zero_index,
 )
 from lowalt.spectra.sliding import fourier_magnitudes, transfer, turns
+from tables import rows
 
 INTERVAL = 2.5e-3
 CARRIER = 4.93192e9
@@ -192,17 +193,7 @@ def test_settings_default_to_the_published_ones():
 
 @pytest.mark.parametrize(
     ("part", "change", "named"),
-    [
-        ("vrp", {"window": 255}, "255"),
-        ("vrp", {"points": 128}, "128"),
-        ("trp", {"window": 1}, "window is 1"),
-        ("trp", {"hop": True}, "hop is True"),
-        ("vt", {"window": 0}, "window is 0"),
-        ("vt", {"speed_step_mps": True}, "step_mps is True"),
-        ("trp", {"overlap": 3}, "overlap"),
-        ("vt", {"speed_min_mps": 7.0}, "min < max"),
-        ("vt", {"speed_max_mps": float("inf")}, "speed_max_mps"),
-    ],
+    rows("spectra", "settings"),
 )
 def test_wrong_settings_are_refused_by_name(part, change, named):
     with pytest.raises(InputError, match=named):

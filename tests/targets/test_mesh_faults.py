@@ -16,6 +16,7 @@ from lowalt.targets.make import make
 from lowalt.targets.mesh_files import read_mesh
 from lowalt.targets.records import merge
 from meshes import TABLE, box, car_record, made, plain, quad_record
+from tables import rows
 
 TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
 
@@ -59,27 +60,7 @@ def test_a_machine_without_pymeshlab_is_told_what_to_install(quad, monkeypatch):
 
 @pytest.mark.parametrize(
     ("path", "value", "names"),
-    [
-        (["unit"], "inch", "unit"),
-        (["front"], "-z", "two different axes"),
-        (["colour"], "red", "colour"),
-        (["parts", "front right", "hinge"], [0, 0], "front right"),
-        (["parts", "front right", "kind"], "wheel", "expected rotor"),
-        (["parts", "front right", "axis"], [0, 0, 0], "axis is zero"),
-        (["parts", "front right", "parent"], "body", "parent"),
-        (["parts", "front right", "region"], {"box": [[0, 0, 0], [1, 1, 1]]}, "front right"),
-        (["parts", "body", "meshes", 0, "file"], "/etc/body.stl", "inside the folder"),
-        (["parts", "body", "meshes", 0, "file"], "../body.stl", "inside the folder"),
-        (["parts", "body", "meshes", 0, "geometry"], ["seat"], "geometry .'seat'. is not in it"),
-        (["points"], 4, "leave none for the body"),
-        (["unit"], "in", "part front left measures 0.00508 m in a mesh of 0.205 m.* is the unit"),
-        (
-            ["parts", "front right", "meshes", 0, "unit"],
-            "in",
-            "part front right measures .* is the unit",
-        ),
-        (["parts", "front right"], {"kind": "body"}, "front right"),
-    ],
+    rows("meshes", "records"),
 )
 def test_bad_records_are_refused_by_key_and_value(path, value, names, quad):
     record = quad_record()
@@ -192,20 +173,7 @@ def test_a_child_may_sort_before_its_parent(bird):
 
 @pytest.mark.parametrize(
     ("name", "change", "words"),
-    [
-        (
-            "right inner",
-            {"parent": "right outer"},
-            "parent is 'right .*', which hangs on 'right .*' itself",
-        ),
-        ("right inner", {"kind": "body"}, "2 of kind body"),
-        ("body", {"kind": "wing"}, "0 of kind body"),
-        (
-            "right outer",
-            {"region": {"box": [[0.03, None, -0.01], [None, None, 0.01]]}},
-            "parts 'right inner' and 'right outer' take the same surface",
-        ),
-    ],
+    rows("meshes", "parts"),
 )
 @pytest.mark.parametrize("order", [1, -1])
 def test_parts_that_contradict_one_another_are_refused_whatever_their_order(

@@ -12,6 +12,7 @@ from lowalt.targets.mocap_joints import read_bvh, to_nodes
 from lowalt.targets.mocap_motion import FROM_FILE, nodes_m, posed
 from lowalt.targets.skeleton import NODES
 from real_inputs import FOLDER, needs_inputs
+from tables import rows
 from walkers import CHANNELS, PUBLISHED, cloud_of, walk, write_files
 
 
@@ -147,19 +148,7 @@ def test_frames_with_faults_may_be_left_out(files):
 
 @pytest.mark.parametrize(
     ("old", "new", "names"),
-    [
-        ("angle deg", "angle rad", "angle"),
-        (":hierarchy", ":family", ":hierarchy"),
-        ("lfemur ltibia", "lfemur", "ltibia"),
-        ("length 0.45", "length x", "0.45|'x'"),
-        ("order TX TY TZ RX RY RZ", "order RX RY RZ", "root order"),
-        ("name lfemur", "name thigh", "lfemur"),
-        ("dof rx ry rz", "dof rx ry rq", "dof"),
-        ("axis 0 0 0 XYZ", "axis 0 0 0 ZYX", "ZYX"),
-        ("axis XYZ", "axis ZYX", "axis order of root is 'ZYX'"),
-        ("length 7.0", "length -7.0", r"length of lfemur is -7.0, expected at least 0"),
-        ("position 0 0 0", "position 0 1 0", "offset"),
-    ],
+    rows("recordings", "skeletons"),
 )
 def test_bad_skeletons_are_refused_by_file(files, old, new, names):
     text = (files / "s.asf").read_text()
@@ -172,12 +161,7 @@ def test_bad_skeletons_are_refused_by_file(files, old, new, names):
 
 @pytest.mark.parametrize(
     ("changes", "names"),
-    [
-        ({"max_mismatch_m": 0}, "max_mismatch_m: value 0"),
-        ({"first_frame": 10, "last_frame": 11}, r"2 frames, 0.0167 s, expected at least 72"),
-        ({"units": "inch"}, "units"),
-        ({"motion": "n.amc"}, "n.amc"),
-    ],
+    rows("recordings", "records"),
 )
 def test_bad_records_are_refused_by_name(files, changes, names):
     with pytest.raises(InputError, match=names):

@@ -24,6 +24,7 @@ from lowalt.targets.make import make
 from lowalt.targets.records import estimates, load_records, records_of
 from lowalt.targets.skeleton import circle, joint
 from moving_clouds import row
+from tables import rows
 
 ROOT = Path(__file__).parents[2]
 LAYERS = [ROOT / "config/default.yaml", ROOT / "config/more.yaml"]
@@ -232,37 +233,7 @@ def test_a_joint_lies_at_both_lengths_on_the_side_asked_for():
 
 @pytest.mark.parametrize(
     ("name", "change", "message"),
-    [
-        (
-            "Cessna 172S",
-            {"size_is": "motor diagonal"},
-            r"expected one of \['wing span'\] with model plane",
-        ),
-        (
-            "Cessna 172S",
-            {"row": {"category": "Fixed-wing", "n_rotors_or_wings": 2}},
-            "expected n_rotors_or_wings 1",
-        ),
-        (
-            "JOUAV CW-15",
-            {"row": {"n_rotors_or_wings": 3}},
-            "expected n_rotors_or_wings 1 or 5 in its row",
-        ),
-        (
-            "Agusta A109A",
-            {"row_from": {"length": "x"}},
-            r"row_from names \['length'\], expected columns",
-        ),
-        ("Agusta A109A", {"rate_factors": {"tail rotor": -5}}, "value -5, expected at least 0"),
-        ("Yuneec H520", {"size_is": "wing span"}, "with model radial"),
-        ("Labrador", {"mass_kg": 500}, "mass_kg: value 500, expected at most 120"),
-        ("Road cyclist", {"mass_kg": 30}, "expected it with trot alone"),
-        (
-            "Road cyclist",
-            {"gait": "walk", "speed_mps": 9.0},
-            "speed_mps is 9.0, expected 6 m/s or less of a person",
-        ),
-    ],
+    rows("more_records", "records"),
 )
 def test_records_that_make_no_such_target_are_refused(tmp_path, name, change, message):
     record = yaml.safe_load((ROOT / "config/targets/more.yaml").read_text())[name]
