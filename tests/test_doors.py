@@ -23,6 +23,7 @@ from lowalt.__main__ import main
 from lowalt.config.layers import overlaid
 from lowalt.files.errors import InputError, in_plain_characters
 from lowalt.files.shipped import SHIPPED
+from lowalt.files.yaml_files import load_yaml
 from lowalt.recognition import train_evaluate
 from lowalt.recognition.dataset_samples import opened
 from lowalt.recognition.recogniser import backbone
@@ -124,31 +125,12 @@ def with_key(config: dict, key: str, value: object) -> dict:
     return config | {first: with_key(config.get(first, {}), rest, value)}
 
 
-CODE = {
-    "an effect by its absolute path": ("effects", {"{secret}/evil.py": {}}),
-    "an effect beside the run": ("effects", {"theirs/evil.py": {}}),
-    "an effect above": ("effects", {"../secret/evil.py": {}}),
-    "an effect among shipped ones": ("effects", {"adc": {}, "evil.py": {}}),
-}
-PLACES = {
-    "a file of an effect": ("effects", {"town": {"buildings": "{secret}/town.geojson"}}),
-    "the table of targets": ("targets.table", "{secret}/targets.csv"),
-    "the table of targets by a link": ("targets.table", "theirs/targets.csv"),
-    "records of targets above": ("targets.records", ["../secret/bird.yaml"]),
-    "records by a link": ("targets.records", ["config/targets/uav.yaml", "theirs/bird.yaml"]),
-    "own targets": ("targets.own", {"mine": "{secret}/bird.yaml"}),
-    "own targets by a folder's link": ("targets.own", {"mine": "theirs/folder/bird.yaml"}),
-    "a flight log": ("motion.track", "{secret}/track.csv"),
-    "a flight log that leaves the folder and returns": (
-        "motion.track",
-        "theirs/../../secret/track.csv",
-    ),
-    "the world's tape": ("targets.table", "/dev/zero"),
-}
-INPUTS = {
-    "a folder of inputs": ("inputs", "{secret}"),
-    "a folder of inputs by a link": ("inputs", "theirs/folder"),
-}
+ATTACKS = load_yaml(Path(__file__).parent / "data/tables/attacks.yaml")
+"""Keys of a configuration and what a stranger would have them hold, by name and kind of attack."""
+CODE = ATTACKS["code"]
+PLACES = ATTACKS["places"]
+INPUTS = ATTACKS["inputs"]
+TRAINING = ATTACKS["training"]
 
 
 @functools.cache
@@ -289,19 +271,6 @@ def test_a_run_of_the_user_with_files_of_this_folder_and_the_package_is_read(doo
         path = brought(doors, attack)
         assert len(lowalt.Dataset(path))
         assert len(lowalt.receive(path, "Crow").times_s)
-
-
-TRAINING = {
-    "a file of weights": ("recognition.network.weights", "weights.pt"),
-    "weights beside the run": ("recognition.network.weights", "theirs/weights.pt"),
-    "weights elsewhere": ("recognition.network.weights", "{secret}/weights.pt"),
-    "weights of a hub": ("recognition.network.weights", "hub"),
-    "a backbone": ("recognition.network.backbone", "theirs/net.py:run"),
-    "a table of schemes elsewhere": ("recognition.table", "{secret}/schemes.csv"),
-    "a table of schemes above": ("recognition.table", "../secret/schemes.csv"),
-    "a table of schemes by a link": ("recognition.table", "theirs/schemes.csv"),
-    "a table of schemes that names code": ("recognition.table", "theirs/coded.csv"),
-}
 
 
 def reported(path: str) -> int:

@@ -31,6 +31,7 @@ from lowalt.shards.sample_record import record, row_of
 from lowalt.shards.write import select
 from lowalt.targets.cloud import write as write_cloud
 from lowalt.workflow.stages.motion import MotionStage
+from options import words
 from tables import rows
 
 SUBTYPES = ["DJI Mini 2", "Owl", "NIO ET5T 2023", "Walking Pedestrian 5"]
@@ -259,22 +260,9 @@ def test_the_motion_stage_writes_the_rows_of_the_samples(which, request, tmp_pat
     cloud, path, again = (tmp_path / name for name in ("cloud.npz", "motion.csv", "again.csv"))
     write_cloud(cloud, tracks.clouds[SUBTYPES[0]])
     wildcards = type("", (), {"group": "seen", "part": "00000"})()
-    motion(
-        [
-            "--settings",
-            stage.settings(wildcards),
-            "--clouds",
-            str(cloud),
-            "--group",
-            "seen",
-            "--first",
-            "0",
-            "--count",
-            str(4 * LOOKS),
-            "--out",
-            str(path),
-        ]
-    )
+    settings = stage.settings(wildcards)
+    span = {"group": "seen", "first": 0, "count": 4 * LOOKS}
+    motion(words(settings=settings, clouds=cloud, **span, out=path))
     numbers = [(row["model"], row["track"], row["look"]) for row in read_table(path)]
     assert numbers == [(number, *divmod(number, LOOKS)) for number in range(4 * LOOKS)]
     write_table(again, [row for track in range(4) for row in looks_of(tracks, SUBTYPES[0], track)])

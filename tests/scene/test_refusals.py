@@ -61,14 +61,10 @@ OF_OFDM = (
 GAPS = {"slow_time": {"downlink": 0.75}}
 
 
-USUAL = rows("scenes", "usual")
-"""Effects that one station without noise refuses."""
-
-
 @pytest.mark.parametrize(
     ("network", "effects", "snr_db", "said"),
     [
-        *((ALONE, effects, QUIET, said) for effects, said in USUAL),
+        *((ALONE, effects, QUIET, said) for effects, said in rows("scenes", "usual")),
         (
             ALONE | {"symbol_interval_s": 2e-5, "subcarriers": 16},
             {"phase_noise": {}},
