@@ -7,59 +7,25 @@ import itertools
 
 import numpy as np
 import pytest
-import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lowalt.files.errors import InputError
 from lowalt.targets.surfaces import (
-    Surface,
     airfoil,
-    box,
     cylinder,
     ellipsoid,
     face_normals,
-    foil,
-    hull,
     inside,
     merged,
     ring,
     sample_faces,
     superellipse,
     thin,
-    tube,
     volume,
 )
 
 LENGTH = st.floats(0.01, 10)
-
-
-def assert_closed(surface: Surface) -> None:
-    """Assert by trimesh that the surface is one closed shell with consistent outward faces."""
-    mesh = trimesh.Trimesh(surface.vertices, surface.faces, process=False)
-    assert mesh.is_watertight and mesh.is_winding_consistent
-    assert mesh.volume > 0
-    assert volume(surface) == pytest.approx(mesh.volume, rel=1e-9)
-
-
-@pytest.mark.parametrize(
-    "surface",
-    [
-        ellipsoid((1, 2, 3)),
-        cylinder(0.3, (0, 0, 0), (1, 2, -1)),
-        tube([(0, 0, 0), (0, 1, 0.2), (0, 2, 0)], [0.3, 0.2, 0.1]),
-        tube([(0, 0, 1), (0, 0, 0)], 0.1),
-        hull([(1, 0.3, -0.1, 0.2), (0, 0.5, -0.2, 0.4), (-1, 0.2, 0, 0.1)], bow=0.1),
-        hull([(-1, 0.3, -0.1, 0.2), (1, 0.5, -0.2, 0.4)], bow=0.1),
-        box((1, 2, 3), (4, 5, 6)),
-        ring(superellipse(0.1, 0.2) + np.array([1, 0])),
-        foil([(0, 0, 0, 0.2, 0.3), (1, 0.1, 0, 0.1, 0.1)]),
-    ],
-    ids=lambda surface: len(surface.faces),
-)
-def test_primitives_are_closed_and_outward(surface):
-    assert_closed(surface)
-    assert_closed(surface.mapped(np.diag([-1.0, 1, 1])).moved((1, 2, 3)))
 
 
 @settings(max_examples=30, deadline=None)
