@@ -15,6 +15,7 @@ from forks import printed
 from lowalt.echo.fast.driver import run
 from lowalt.echo.pointwise.results import matrix
 from lowalt.files.errors import InputError
+from lowalt.files.yaml_files import load_yaml
 from lowalt.machine.jit import INNER, LEAN, digest
 from lowalt.machine.machine_code import _DigestCache, dispatcher
 
@@ -39,47 +40,8 @@ print(digest(run.function), digest(matrix.function))
 """Edits a source file of a copy of the package and prints the digests of two of the echo's kernels.
 """
 
-# file, text, its replacement, and whether the keys of both kernels change by it
-EDITS = {
-    "nothing": ("echo/api.py", "import numpy as np", "import numpy as np", [0, 0]),
-    "a module without kernels": (
-        "echo/api.py",
-        "import numpy as np",
-        "import numpy as np\nUNUSED = 1",
-        [0, 0],
-    ),
-    "a function that is not compiled": (
-        "echo/fast/polynomials.py",
-        "nodes = min(count, MOST_RATES)",
-        "nodes = 31",
-        [0, 0],
-    ),
-    "a comment in a kernel": (
-        "echo/fast/vector_loops.py",
-        "    k = degree",
-        "    # Why.\n    k = degree",
-        [0, 0],
-    ),
-    "a called kernel": (
-        "echo/fast/vector_loops.py",
-        "k = degree - first",
-        "k = degree - first + 0",
-        [1, 0],
-    ),
-    "a kernel called by a called one": (
-        "echo/fast/polynomials.py",
-        "half = 0.5 * band",
-        "half = band * 0.5",
-        [1, 0],
-    ),
-    "a constant": ("echo/fast/cell_kernel.py", "SIDE = 4", "SIDE = 3", [1, 0]),
-    "the settings of a called kernel": (
-        "echo/pointwise/terms.py",
-        "@PLAIN\ndef dirichlet",
-        "@LEAN\ndef dirichlet",
-        [0, 1],
-    ),
-}
+EDITS = load_yaml("tests/data/tables/source_edits.yaml")
+"""Edits of sources: a file, a text, its replacement, and whether the keys of both kernels change."""
 
 
 @pytest.fixture(scope="module")
@@ -89,7 +51,10 @@ def digests(tmp_path_factory):
     shutil.copytree(
         Path(lowalt.__file__).parent, place, ignore=shutil.ignore_patterns("__pycache__")
     )
-    programs = [PROGRAM.format((str(place), *edit[:3])) for edit in EDITS.values()]
+    programs = [
+        PROGRAM.format((str(place), edit["file"], edit["text"], edit["replacement"]))
+        for edit in EDITS.values()
+    ]
     return dict(zip(EDITS, map(str.split, printed(programs)), strict=True))
 
 
@@ -97,7 +62,7 @@ def digests(tmp_path_factory):
 def test_the_key_changes_with_what_is_compiled_alone(case, digests):
     before = digests["nothing"]
     assert [int(new != old) for new, old in zip(digests[case], before, strict=True)] == EDITS[case][
-        -1
+        "changes"
     ]
 
 

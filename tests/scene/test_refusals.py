@@ -44,9 +44,7 @@ FMCW = {key: ALONE[key] for key in ("transmit_array", "receive_array", "power_w"
     "symbols": 400,
     "waveform": {"kind": "fmcw", "sweep_hz": 150e6, "sweep_s": 400e-6, "samples": 64},
 }
-BELOW = ALONE | {"stations": {"A": STATIONS["A"] | {"position_m": [0.0, 0.0, -1.0]}}}
 QUIET = [float("inf")]
-NOISY = [3.0]
 OF_OFDM = (
     "data_symbols",
     "power_amplifier",
@@ -58,52 +56,15 @@ OF_OFDM = (
     "clock_offset",
     "carrier_offset",
 )
-GAPS = {"slow_time": {"downlink": 0.75}}
 
 
 @pytest.mark.parametrize(
     ("network", "effects", "snr_db", "said"),
     [
         *((ALONE, effects, QUIET, said) for effects, said in rows("scenes", "usual")),
-        (
-            ALONE | {"symbol_interval_s": 2e-5, "subcarriers": 16},
-            {"phase_noise": {}},
-            QUIET,
-            "phase_noise: network.symbol_interval_s",
-        ),
-        (ALONE, {"cell_noise": {"snr_db": 3.0}}, NOISY, "cell_noise: snr_db is 3.0 .*expected"),
-        (
-            ALONE,
-            {"receiver_noise": {}},
-            NOISY,
-            r"receiver_noise: noise.snr_db is \[3.0\], expected \[.inf\]",
-        ),
-        (BELOW, {"clutter": {}}, QUIET, "clutter: station A .*above the ground"),
-        (
-            BELOW,
-            {"background_channel": {}},
-            QUIET,
-            "background_channel: station A .*above the ground",
-        ),
-        (
-            ALONE | {"carrier_hz": 28e9},
-            {"ground_reflection": {}},
-            QUIET,
-            "1 to 10 GHz, .*expected permittivity",
-        ),
-        (ALONE, GAPS, NOISY, "slow_time: gaps hold no signal"),
-        (LINKED, {}, QUIET, r"network.stations: \['AB'\] are links .*expected effects.direct_path"),
-        (
-            LINKED,
-            {"direct_path": {}, "transmit_leakage": {}},
-            QUIET,
-            "not modelled between two stations",
-        ),
-        (
-            ALONE | {"stations": STATIONS, "guard_subcarriers": -9},
-            {},
-            QUIET,
-            "guard_subcarriers: -9, .*interference",
+        *(
+            ((LINKED if links else ALONE) | changes, effects, [snr_db], said)
+            for links, changes, effects, snr_db, said in rows("scenes", "networks")
         ),
         *((FMCW, {name: {}}, QUIET, rf"effects: \['{name}'\] .*kind 'fmcw'") for name in OF_OFDM),
         *(
@@ -131,16 +92,7 @@ def test_a_longer_prefix_allows_a_larger_slip(effects):
 
 @pytest.mark.parametrize(
     ("blocks", "said"),
-    [
-        (
-            {"shards": {"kind": "recipe"}, "noise": {"snr_db": NOISY}},
-            "shards.kind: 'recipe' draws white noise",
-        ),
-        (
-            {"spectra": {"times": "known"}, "noise": {"snr_db": QUIET}},
-            "slow_time.regrid: 'nudft' makes an even signal",
-        ),
-    ],
+    rows("scenes", "later"),
 )
 def test_effects_that_later_stages_do_not_fit_are_refused(blocks, said):
     effects = {

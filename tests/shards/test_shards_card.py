@@ -22,6 +22,7 @@ from lowalt.shards.croissant import metadata
 from lowalt.shards.index import build as index_of
 from lowalt.shards.write import ChunkSamples, write_shard
 from options import words
+from tables import rows
 
 
 def make_card(folder, **options):
@@ -61,12 +62,7 @@ def test_card_has_counts_configuration_and_versions(published):
 
 @pytest.mark.parametrize(
     ("run", "name", "version"),
-    [
-        ("trial", "lowalt-trial", "0.2.0"),
-        ("lowalt-40-v1", "lowalt-40-v1", "1.0.0"),
-        ("lowalt-40-v12", "lowalt-40-v12", "12.0.0"),
-        ("trial-v2", "lowalt-trial-v2", "0.2.0"),
-    ],
+    rows("cards", "versions"),
 )
 def test_only_a_frozen_run_gives_its_data_set_a_version_and_a_card_with_rules(
     published, tmp_path, run, name, version

@@ -209,20 +209,7 @@ def wheeled(tmp_path, axis=0, centre=0.33, count=4, turns=None) -> dict:
 
 @pytest.mark.parametrize(
     ("changes", "words"),
-    [
-        (
-            {"centre": 1.3},
-            "fl, fr, rl, rr: its centre lies 0.9 m above .* a body 1 m high.*`up` .--up. reversed",
-        ),
-        (
-            {"axis": 1},
-            "fl, fr, rl, rr: its surface measures 0.66 m along its axle and 0.2 x 0.66 m across",
-        ),
-        (
-            {"turns": [0, 1, 0]},
-            r"rr: its axle points front, .0.0, 1.0, 0.0. .* expected right or left",
-        ),
-    ],
+    rows("meshes", "wheels"),
 )
 def test_wheels_that_cannot_roll_are_refused_with_their_measures(changes, words, tmp_path):
     with pytest.raises(InputError, match=words):

@@ -6,6 +6,7 @@ import pytest
 from lowalt.files.errors import InputError
 from lowalt.targets.mesh_files import pieces, read_mesh, stated_unit_m
 from shown_meshes import FACES, TETRAHEDRON, dae, measures, prism
+from tables import rows
 
 
 def test_negative_indices_count_back_from_the_vertices_so_far(tmp_path):
@@ -32,15 +33,7 @@ def test_an_obj_with_a_corner_that_is_no_vertex_or_no_number_is_refused(line, tm
 
 @pytest.mark.parametrize(
     ("comment", "metres"),
-    [
-        ("# File units = inches", 0.0254),
-        ("# Units: mm", 0.001),
-        ("# unit 1 foot", 0.3048),
-        ("#units in metres", 1.0),
-        ("# Unit: in", 0.0254),
-        ("# the unit of all this is love", None),
-        ("o unit: mm", None),
-    ],
+    rows("units", "comments"),
 )
 def test_a_unit_in_an_obj_s_comment_counts(comment, metres, tmp_path):
     (tmp_path / "a.obj").write_text(comment + "\nv 0 0 0\n")
