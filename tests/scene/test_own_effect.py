@@ -13,14 +13,12 @@ import pytest
 import lowalt
 from lowalt.config.layers import overlaid
 from lowalt.files.errors import InputError
-from lowalt.scene.chain import SceneSample
 from lowalt.scene.effects import called, dotted
-from lowalt.scene.observe import observe
 from lowalt.workflow import sources
 from lowalt.workflow.stages.noise import NoiseStage
 from lowalt.workflow.stages.shards import ShardsStage
 from lowalt.workflow.stages.tiles import TilesStage
-from scenes import network, scene, target
+from scenes import sample_of
 from tables import rows
 
 HALF = """
@@ -54,16 +52,12 @@ def test_it_acts_behind_the_shipped_effects_of_its_place_with_a_stream_of_its_fi
     }
     assert not called({"half.py": {"share": 1}})
     shutil.copytree(half, half / "elsewhere", ignore=shutil.ignore_patterns("elsewhere"))
-    cloud, row = target(np.random.default_rng(1))
-    heard = []
-    for effects in ({}, {"half.py": {}}, {"elsewhere/half.py": {}}):
-        asked = scene(effects, network())
-        heard.append(
-            SceneSample(asked, observe(asked, asked.network.stations[0], cloud, row)).arrived()
-        )
-    assert (heard[1] == heard[2]).all()
-    drawn = asked.stream("half.py", row, "A").random()
-    np.testing.assert_allclose(heard[1], 0.5 * drawn * heard[0], rtol=1e-9)
+    whole, named, moved = (
+        sample_of(effects) for effects in ({}, {"half.py": {}}, {"elsewhere/half.py": {}})
+    )
+    np.testing.assert_array_equal(named.arrived(), moved.arrived())
+    drawn = named.scene.stream("half.py", named.view.row, "A").random()
+    np.testing.assert_allclose(named.arrived(), 0.5 * drawn * whole.arrived(), rtol=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -94,10 +88,8 @@ def test_a_factor_of_another_shape_than_the_contract_s_is_refused_in_one_sentenc
     Path("half.py").write_text(
         HALF.replace('settings["share"] * rng.random() + 0 * view.places[..., 0]', factor)
     )
-    cloud, row = target(np.random.default_rng(1))
-    asked = scene({"half.py": {}}, network())
     with pytest.raises(InputError, match=r"half\.py: visible gives an array of shape"):
-        SceneSample(asked, observe(asked, asked.network.stations[0], cloud, row)).arrived()
+        sample_of({"half.py": {}}).arrived()
 
 
 ACTING = {
@@ -130,11 +122,7 @@ def received_with(function: str, result: str):
         "    array.flat[0] = value\n    return array\n"
         f"def {function}(settings, {ACTING[function]}):\n    return {result}\n"
     )
-    cloud, row = target(np.random.default_rng(1))
-    asked = scene({"mine.py": {}}, network())
-    return (
-        SceneSample(asked, observe(asked, asked.network.stations[0], cloud, row)).received().signal
-    )
+    return sample_of({"mine.py": {}}).received().signal
 
 
 @pytest.mark.parametrize("function", ACTING)

@@ -15,7 +15,6 @@ from dataset import CONFIG, SEED, build, motion_rows, write_settings
 from hub_library import loaded
 from lowalt.config.network import Network
 from lowalt.files.errors import InputError
-from lowalt.noise.awgn import noisy_signals
 from lowalt.numerics.streams import stream
 from lowalt.scene.effects.transmitter import slow_time
 from lowalt.shards import ShardSet, clean
@@ -119,34 +118,6 @@ def test_splits_by_sample_give_each_fold_its_own_levels(tmp_path):
                     entry = json.load(archive.extractfile(name))
                     seen += [(entry["model"], snr) for snr in clean.sample_snrs(entry)]
     assert sorted(seen) == [(model, snr) for model in range(4) for snr in (3.0, 8.0, np.inf)]
-
-
-def test_powers_of_a_scene_with_effects_set_the_noise(tmp_path):
-    rows = [row | {"fold": "train"} for row in motion_rows("unseen", 1)]
-    echoes = np.full((3, 1, 400), 1 + 1j, np.complex64)
-    powers = np.array([[1e-3], [2.0], [0.0]])
-    split = {"by": "motion", "train": 1, "val": 1, "test": 1}
-    network = Network.from_settings(NETWORK)
-    write_shard(
-        tmp_path / "unseen-train-00000.tar",
-        ChunkSamples(rows, [3.0], split, 3, network, powers=powers),
-        "train",
-        "recipe",
-        lambda *_: (npy(echoes[:, 0]), {}),
-    )
-    with tarfile.open(tmp_path / "unseen-train-00000.tar") as archive:
-        name = next(name for name in archive.getnames() if name.endswith(".json"))
-        entry = json.load(archive.extractfile(name))
-    expected = noisy_signals(echoes, rows, STATIONS, [3.0], 3, powers)[0, 0]
-    found = clean.noisy(entry, echoes[:, 0], STATIONS, 3.0)
-    assert (
-        (found == expected).all()
-        and (found[2] == 1 + 1j).all()
-        and found[1].std() > found[0].std() > 0
-    )
-    assert clean.POWER not in json.loads(clean.unpacked(entry, 3.0))
-    with pytest.raises(InputError, match="expected 8"):
-        clean.unpacked(entry, 8.0)
 
 
 def test_noise_passes_the_canceller_of_a_scene_and_noise_that_effects_add_is_refused(tmp_path):
