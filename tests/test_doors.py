@@ -32,6 +32,7 @@ from lowalt.shards.build import main as build_shards
 from lowalt.shards.remake import Remaker
 from lowalt.targets.records import load_table, with_row
 from lowalt.workflow.refusals import refuse_input
+from tables import rows
 
 EFFECT = """
 from pathlib import Path
@@ -204,51 +205,22 @@ def test_a_run_s_configuration_names_no_folder_of_inputs_outside(doors, entry, a
     assert "inputs is" in held(lambda: ENTRIES[entry](path), capsys)
 
 
-def stripped(doors: Path, whole: dict) -> str:
-    """A run's configuration without all but its effects."""
-    (doors / "theirs/config.yaml").write_text(yaml.safe_dump({"effects": whole["effects"]}))
-    return "theirs/config.yaml"
-
-
-def renamed(doors: Path, whole: dict) -> str:
-    """A whole configuration under the name of an overlay, outside of a run's folder."""
-    (doors / "scene.yaml").write_text(yaml.safe_dump(whole))
-    return "scene.yaml"
-
-
-def linked(doors: Path, whole: dict) -> str:
-    """A link with the name of an overlay to a stripped configuration."""
-    (doors / "scene.yaml").symlink_to(stripped(doors, whole))
-    return "scene.yaml"
-
-
-def beside_an_index(doors: Path, whole: dict) -> str:
-    """An overlay in the folder of a data set."""
-    path = "theirs/shards/scene.yaml"
-    (doors / path).write_text(yaml.safe_dump({"effects": whole["effects"]}))
-    return path
-
-
-def beside_a_run(doors: Path, whole: dict) -> str:
-    """An overlay in a run's folder."""
-    (doors / "theirs/scene.yaml").write_text(yaml.safe_dump({"effects": whole["effects"]}))
-    return "theirs/scene.yaml"
-
-
-def beside_a_model(doors: Path, whole: dict) -> str:
-    """An overlay in the folder of a trained model."""
-    (doors / "model").mkdir()
-    (doors / "model/model.safetensors").touch()
-    (doors / "model/scene.yaml").write_text(yaml.safe_dump({"effects": whole["effects"]}))
-    return "model/scene.yaml"
-
-
-@pytest.mark.parametrize(
-    "disguise", [stripped, renamed, linked, beside_an_index, beside_a_run, beside_a_model]
-)
+@pytest.mark.parametrize(("path", "beside", "whole", "linked"), rows("attacks", "disguises"))
 @pytest.mark.parametrize("entry", ["receive", "sample", "explain", "spectra", "run"])
-def test_a_run_s_configuration_is_known_in_every_disguise(doors, entry, disguise, capsys):
-    path = disguise(doors, attacked(doors, CODE["an effect beside the run"]))
+def test_a_run_s_configuration_is_known_in_every_disguise(
+    doors, entry, path, beside, whole, linked, capsys
+):
+    """A whole configuration or its effects alone, under any name, behind a link, and beside a file
+    that came with it.
+    """
+    config = attacked(doors, CODE["an effect beside the run"])
+    held_path = doors / (linked or path)
+    held_path.parent.mkdir(exist_ok=True)
+    held_path.write_text(yaml.safe_dump(config if whole else {"effects": config["effects"]}))
+    if linked:
+        (doors / path).symlink_to(held_path)
+    if beside:
+        (doors / beside).touch()
     assert "its effect 'theirs/evil.py' is code" in held(lambda: ENTRIES[entry](path), capsys)
 
 

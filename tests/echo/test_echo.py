@@ -44,6 +44,11 @@ def positions(motion: Rigid) -> np.ndarray:
     )
 
 
+def heard(net: Network, motion: Rigid, tolerance: float | None = None):
+    """The echo of points of 1 m2 at the first station, whose beam points at their centre."""
+    return echo_signal(net, net.stations[0], motion, 1.0, motion.translation[0, 0], tolerance)
+
+
 def relative(value, truth) -> float:
     return float(np.max(abs(value - truth)) / np.max(abs(truth)))
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from test_echo import cloud_in_motion, network, relative
+from test_echo import cloud_in_motion, heard, network, relative
 
 import pointwise_echo
 from lowalt.echo import echo_signal
@@ -62,11 +62,11 @@ def test_a_looser_tolerance_takes_shorter_polynomials(always_approximate):
     motion = cloud_in_motion(np.random.default_rng(2), 400, 100, (200.0, 30.0, 60.0), 0.3)
     orders = []
     for tolerance in (1e-2, 1e-4, 1e-7, 1e-9, None):
-        result = echo_signal(net, net.stations[0], motion, 1.0, motion.translation[0, 0], tolerance)
+        result = heard(net, motion, tolerance)
         orders.append(sum(result.method.orders))
         assert result.method.cheap + result.method.exact + result.method.general == 400
     assert orders == sorted(orders) and orders[0] < orders[-1] - 8
-    loose = echo_signal(net, net.stations[0], motion, 1.0, motion.translation[0, 0], 1e-2)
+    loose = heard(net, motion, 1e-2)
     assert loose.method.single
 
 

@@ -1,8 +1,6 @@
 """Users' meshes, made and real: places, axes, units and formats, parts that turn, regions."""
 
 import os
-import subprocess
-import sys
 import warnings
 from pathlib import Path
 
@@ -21,6 +19,7 @@ from lowalt.targets.records import read_records
 from lowalt.targets.surfaces import volume
 from meshes import ROOT, TABLE, box, car_record, made, plain, quad_record, saved, write_quad
 from real_inputs import FOLDER, needs_inputs
+from snakemake_runs import run
 
 
 def test_places_senses_and_sizes_are_those_of_the_record(quad):
@@ -280,19 +279,9 @@ def test_the_workflow_s_rule_makes_the_cloud_of_meshes_with_odd_names(tmp_path):
     ):
         (copy / name).symlink_to(ROOT / name)
     environment = {**os.environ, "LOWALT_INPUTS": str(inputs), "PYTHONPATH": str(ROOT / "src")}
-    command = [
-        "snakemake",
-        "--cores",
-        "2",
-        "--configfile",
-        str(tmp_path / "overlay.yaml"),
-        "--",
-        "clouds",
-    ]
-    done = subprocess.run(
-        [sys.executable, "-m", *command], cwd=copy, env=environment, capture_output=True, text=True
-    )
-    assert done.returncode == 0 and "from files: DJI Mini 2" in done.stderr, done.stderr[-3000:]
+    line = ["--cores", "2", "--configfile", str(tmp_path / "overlay.yaml"), "--", "clouds"]
+    status, said = run(copy, line, environment)
+    assert status == 0 and "from files: DJI Mini 2" in said, said[-3000:]
     seed = yaml.safe_load((ROOT / "config/default.yaml").read_text())["seed"]
     cloud = clouds.read(copy / "results/odd/clouds/dji-mini-2.npz")
     np.testing.assert_array_equal(cloud.points, made("DJI Mini 2", inputs, seed, **record).points)

@@ -54,6 +54,11 @@ def without(config: dict) -> dict:
     }
 
 
+def cubes_of_row(maker, row: dict, snr_db: float) -> list[Cube]:
+    """The cubes of all stations of a motion model at an SNR (dB)."""
+    return maker.cubes(row, snr_db, maker.signal(row, snr_db))
+
+
 def truth(cube: Cube, name: str) -> np.ndarray:
     return cube.truth[:, TRUTH.index(name)]
 
@@ -120,7 +125,7 @@ def test_noise_has_the_power_of_the_snr_in_every_cell_and_streams_of_its_own(dat
 def test_noise_of_cells_passes_the_canceller_as_the_signal_s_does(dataset):
     maker = Dataset(dataset.config | {"effects": LAND}, dataset.clouds).maker
     row = dataset.row(dataset.place(1))
-    quiet, noisy = (maker.cubes(row, snr, maker.signal(row, snr))[0] for snr in (np.inf, 3.0))
+    quiet, noisy = (cubes_of_row(maker, row, snr)[0] for snr in (np.inf, 3.0))
     power = maker.received(row)[1][0, 0]
     rng = stream(dataset.plan.seed, "cells", row["subtype"], row["model"], "A", 3.0)
     white = add_noise(np.zeros(quiet.cells.shape), 3.0, rng, power)
