@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from lowalt.files.errors import InputError
+from lowalt.files.yaml_files import load_yaml
 from lowalt.targets.mocap_files import read_motion, read_skeleton
 from lowalt.targets.mocap_joints import read_bvh, to_nodes
 from lowalt.targets.mocap_motion import FROM_FILE, nodes_m, posed
@@ -29,32 +30,9 @@ def test_a_motion_s_nodes_are_the_joints_of_an_independent_conversion_to_bvh():
     joints, rate = read_bvh(folder / "131_01.bvh")
     assert rate == pytest.approx(120, rel=1e-5)
     unit = 0.0254 / 0.45
-    same = {
-        "root": "Hips",
-        "lhipjoint": "LeftHip",
-        "lfemur": "LeftKnee",
-        "ltibia": "LeftAnkle",
-        "lfoot": "LeftToe",
-        "ltoes": "LeftToe/end",
-        "rhipjoint": "RightHip",
-        "rfemur": "RightKnee",
-        "rtibia": "RightAnkle",
-        "rfoot": "RightToe",
-        "rtoes": "RightToe/end",
-        "lowerback": "Chest",
-        "upperback": "Chest2",
-    }
-    above = {
-        "lowerneck": "Neck",
-        "upperneck": "Head",
-        "head": "Head/end",
-        "lclavicle": "LeftShoulder",
-        "lhumerus": "LeftElbow",
-        "lradius": "LeftWrist",
-        "rclavicle": "RightShoulder",
-        "rhumerus": "RightElbow",
-        "rradius": "RightWrist",
-    }
+    names = load_yaml("tests/data/tables/cmu_joints.yaml")
+    same = names["below the thorax"]
+    above = names["above the thorax"]
     positions = nodes_m(posed(skeleton, channels, 120)) @ FROM_FILE
     assert positions.shape == (994, 31, 3)
     for node, joint in same.items():
