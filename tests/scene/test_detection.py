@@ -75,12 +75,12 @@ def land(wind_mps, rng, radio=RADIO):
     return moving + np.sqrt(still / (1 + still)) * np.exp(2j * np.pi * rng.random(400))
 
 
-@pytest.mark.parametrize("depth_db", [20.0, 30.0])
-def test_the_clutter_filter_leaves_windblown_land_its_depth_below_what_it_was(depth_db):
+def test_the_clutter_filter_leaves_windblown_land_its_depth_below_what_it_was():
     echoes = land(4.5, np.random.default_rng(3))
     assert np.mean(abs(echoes) ** 2) == pytest.approx(1.0, rel=0.1)
-    left = filtered({"kind": "clutter", "depth_db": depth_db}, echoes)
-    assert -depth_db - 18 < 10 * np.log10(np.mean(abs(left) ** 2)) < -depth_db - 12
+    for depth_db in (20.0, 30.0):
+        left = filtered({"kind": "clutter", "depth_db": depth_db}, echoes)
+        assert -depth_db - 18 < 10 * np.log10(np.mean(abs(left) ** 2)) < -depth_db - 12
     # A mean leaves all that moves.
     assert 10 * np.log10(np.mean(abs(filtered({}, echoes)) ** 2)) > -8
 

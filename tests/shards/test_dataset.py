@@ -60,22 +60,28 @@ def test_a_whole_data_set_is_written_without_the_workflow(dataset, index, tmp_pa
         ), path.name
 
 
+def remade(capsys, index, *words) -> tuple[int, str]:
+    """The exit status of the command `remake`, and what it says."""
+    status = lowalt_command(["remake", str(index), *map(str, words)])
+    return status, "".join(capsys.readouterr())
+
+
 def test_a_stored_sample_is_made_again_and_another_is_told(index, tmp_path, capsys):
     key = ShardSet(index).keys[0].decode()
-    assert lowalt_command(["remake", str(index), key]) == 0
-    assert "1 samples made again" in capsys.readouterr().out
-    assert lowalt_command(["remake", str(index), "crow-000000-snrinf"]) == 2
-    assert "not in" in capsys.readouterr().err
     clouds = shutil.copytree(index.parent.parent / "clouds", tmp_path / "clouds")
     for path in clouds.iterdir():
         cloud = read(path)
         cloud.points[:] *= 1.01
         cloud.track[:] *= 1.01
         write_cloud(path, cloud)
-    assert lowalt_command(["remake", str(index), key, "--clouds", str(clouds)]) == 1
-    assert f"sample {key}: its" in capsys.readouterr().out
-    assert lowalt_command(["remake", str(index), key, "--clouds", str(tmp_path / "none")]) == 2
-    assert "cloud of" in capsys.readouterr().err
+    for words, ends, says in (
+        ([key], 0, "1 samples made again"),
+        (["crow-000000-snrinf"], 2, "not in"),
+        ([key, "--clouds", clouds], 1, f"sample {key}: its"),
+        ([key, "--clouds", tmp_path / "none"], 2, "cloud of"),
+    ):
+        status, said = remade(capsys, index, *words)
+        assert status == ends and says in said
 
 
 def test_samples_to_make_again_are_drawn_and_an_index_must_say_how(index):
@@ -184,26 +190,21 @@ def test_samples_of_a_scene_that_hides_points_are_made_again_with_its_surfaces(
     write_run(scene, tmp_path, "signal")
     index = str(tmp_path / "shards/index.json")
     key = scene.key(0)
-    assert (
-        lowalt_command(["remake", index, key]) == 2 and "has no surfaces" in capsys.readouterr().err
-    )
+    status, said = remade(capsys, index, key)
+    assert status == 2 and "has no surfaces" in said
     occluders.write(tmp_path / "occluders/dji-mini-2.npz", surfaces, "DJI Mini 2")
     (tmp_path / "config.yaml").write_text(json.dumps({"run": "hidden"}))
     card.write(index, tmp_path / "config.yaml")
-    assert (
-        lowalt_command(["remake", index, key])
-        == lowalt_command(["verify", index, "--remake", "1"])
-        == 0
-    )
-    (tmp_path / "occluders").rename(tmp_path / "elsewhere")
-    assert lowalt_command(["remake", index, key]) == 2
-    capsys.readouterr()
-    assert lowalt_command(["remake", index, key, "--occluders", str(tmp_path / "elsewhere")]) == 0
-    assert "1 samples made again, equal in every byte" in capsys.readouterr().out
+    assert remade(capsys, index, key)[0] == 0
+    assert lowalt_command(["verify", index, "--remake", "1"]) == 0
+    elsewhere = (tmp_path / "occluders").rename(tmp_path / "elsewhere")
+    assert remade(capsys, index, key)[0] == 2
+    status, said = remade(capsys, index, key, "--occluders", elsewhere)
+    assert status == 0 and "1 samples made again, equal in every byte" in said
     moved = surfaces | {"vertices": surfaces["vertices"] + 1.0}
-    occluders.write(tmp_path / "elsewhere/dji-mini-2.npz", moved, "DJI Mini 2")
-    assert lowalt_command(["remake", index, key, "--occluders", str(tmp_path / "elsewhere")]) == 1
-    assert f"sample {key}: its signal comes out otherwise" in capsys.readouterr().out
+    occluders.write(elsewhere / "dji-mini-2.npz", moved, "DJI Mini 2")
+    status, said = remade(capsys, index, key, "--occluders", elsewhere)
+    assert status == 1 and f"sample {key}: its signal comes out otherwise" in said
 
 
 def test_a_cloud_is_made_once_and_when_a_sample_of_its_target_is_asked_for(monkeypatch):

@@ -311,18 +311,20 @@ def test_no_layers_at_all_are_the_embedded_default():
     assert network == Network.from_settings(overlaid([])["network"])
 
 
-def test_wrong_words_are_refused(plain):
-    with pytest.raises(
-        InputError, match=r"at is 'range', expected one of \['subcarriers', 'receiver'"
-    ):
-        lowalt.receive(plain, CAR, at="range")
-    with pytest.raises(InputError, match="model is -1, expected a whole number from 0"):
-        lowalt.receive(plain, CAR, -1)
-    with pytest.raises(InputError, match="subtype is 'Crow', expected one of"):
-        lowalt.receive(plain, "Crow")
-    with pytest.raises(
-        InputError, match=r"station 'D': not in the network, which has \['A', 'B', 'C'\]"
-    ):
-        lowalt.receive(plain, CAR, station="D")
+@pytest.mark.parametrize(
+    ("subtype", "model", "words", "said"),
+    [
+        (CAR, 0, {"at": "range"}, r"at is 'range', expected one of \['subcarriers', 'receiver'"),
+        (CAR, -1, {}, "model is -1, expected a whole number from 0"),
+        ("Crow", 0, {}, "subtype is 'Crow', expected one of"),
+        (CAR, 0, {"station": "D"}, r"station 'D': not in the network, which has \['A', 'B', 'C'\]"),
+    ],
+)
+def test_wrong_words_are_refused(plain, subtype, model, words, said):
+    with pytest.raises(InputError, match=said):
+        lowalt.receive(plain, subtype, model, **words)
+
+
+def test_a_subtype_of_the_default_that_is_misspelt_is_refused_with_the_right_name():
     with pytest.raises(InputError, match=r"expected perhaps \['Crow'\]"):
         lowalt.receive({}, "Krow")

@@ -32,7 +32,7 @@ from stage_runs import check_members, run_stages
 
 SHOWN = {"hrrp": {"window": 2, "hop": 1, "cells": 9}, "range_doppler": {"cells": 9, "points": 512}}
 SNRS = [3.0, float("inf")]
-LAND = {"clutter": {"gamma": 0.5}, "canceller": {"kind": "mean"}}
+LAND = {"clutter": {"gamma": 0.5, "reach_m": 200.0}, "canceller": {"kind": "mean"}}
 
 
 @pytest.fixture(scope="module")
@@ -77,7 +77,9 @@ def test_images_of_cells_come_after_the_other_three_which_stay_as_without_them(d
 
 
 def test_the_stages_draw_what_a_data_set_draws_on_the_spot(dataset, tmp_path):
-    config = merge(dataset.config, {"effects": LAND, "targets": {"select": ["Owl"]}})
+    one = {"targets": {"select": ["Owl"]}, "motion": {"models": 1, "models_per_chunk": 1}}
+    one["split"] = {"train": 1, "val": 0, "test": 0}
+    config = merge(dataset.config, {"effects": LAND, **one})
     made = Dataset(config, dataset.clouds)
     stored = ShardSet(run_stages(made, tmp_path, "image"))
     check_members(pickle.loads(pickle.dumps(made)), stored)
