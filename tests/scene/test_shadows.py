@@ -153,11 +153,11 @@ def test_waves_go_round_a_blade_as_its_slit_lets_them_through(width_m):
 
 def test_bones_hide_as_points_along_them_say():
     rng = np.random.default_rng(3)
-    nodes = rng.uniform(-1, 1, (10, 8, 3))
+    nodes = rng.uniform(-1, 1, (20, 8, 3))
     place = np.array([4.0, 1.0, 0.5])
     bones = np.array([[0, 1], [2, 3], [4, 5], [6, 6]])
     radius_m = np.array([0.1, 0.2, 0.15, 0.3])
-    found = np.zeros((10, 8), bool)
+    found = np.zeros((20, 8), bool)
     found[3, 2] = True
     hidden_by_bones({"bones": bones, "radius_m": radius_m}, place, nodes, found)
     assert found[3, 2] and 0.05 < found.mean() < 0.6
@@ -165,7 +165,7 @@ def test_bones_hide_as_points_along_them_say():
         expected = False
         sure = (n, l) != (3, 2)
         for (a, b), radius in zip(bones, radius_m, strict=True):
-            along = nodes[n, a] + np.linspace(0, 1, 501)[:, None] * (nodes[n, b] - nodes[n, a])
+            along = nodes[n, a] + np.linspace(0, 1, 2001)[:, None] * (nodes[n, b] - nodes[n, a])
             way = (place - nodes[n, l]) / np.linalg.norm(place - nodes[n, l])
             ahead = (along - nodes[n, l]) @ way
             off = np.linalg.norm(
