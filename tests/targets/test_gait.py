@@ -7,14 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from lowalt.files.errors import InputError
 from lowalt.targets import cloud as clouds
 from lowalt.targets import gait, gait_walk
 from lowalt.targets.records import load_table, merge, read_records
-from lowalt.targets.skeleton import FEET, NODES, PARENTS, rotation, stature_m
+from lowalt.targets.skeleton import FEET, NODES, PARENTS, stature_m
 from tables import rows
 
 ROOT = Path(__file__).parents[2]
@@ -126,15 +124,6 @@ def test_runner_flies_and_walker_never_does():
         track, _, _ = gait.cycle_m(kind, 1.7, speed, 200)
         lowest = track[..., 2].min(axis=1) - track[..., 2].min()
         assert bool(lowest.max() > 0.06) is flies
-
-
-@given(st.sampled_from("xyz"), st.floats(-7, 7))
-def test_rotation_is_a_right_handed_rotation(axis, angle):
-    matrix = rotation(axis, np.array(angle))
-    assert np.allclose(matrix @ matrix.T, np.eye(3), atol=1e-15)
-    unit = np.eye(3)["xyz".index(axis)]
-    side = np.roll(unit, 1)
-    assert np.dot(np.cross(side, matrix @ side), unit) == pytest.approx(np.sin(angle), abs=1e-12)
 
 
 @pytest.mark.parametrize(
