@@ -17,16 +17,10 @@ from lowalt.motion.table import NUMBERS
 from lowalt.numerics.streams import stream
 from lowalt.targets.make import make
 from lowalt.targets.records import load_records
-from moving_clouds import recorded_cloud, rigid_cloud, row
+from moving_clouds import SETTINGS, recorded_cloud, rigid_cloud, row
 
 KINDS = "uav", "bird", "vehicle", "pedestrian"
 MASTS = np.array([[0.0, 0.0], [500.0, 0.0], [250.0, 433.0127018922193]])
-MOTION = {
-    "region": {"polygon_m": None, "mast_clearance_m": 10.0},
-    "height_m": {"UAV": [30.0, 150.0], "Bird": [20.0, 120.0]},
-    "tilt_deg": 20.0,
-    "cadence": "free",
-}
 
 
 def test_the_table_reads_back_the_same_bits(tmp_path):
@@ -65,7 +59,7 @@ def test_places_are_uniform_over_the_triangle_of_masts_and_clear_of_them():
     corners = region_polygon(MASTS, None)
     cloud = rigid_cloud("rotor", "UAV")
     rows = [
-        draw(stream(7, "motion", "test", i), cloud, TABLE["DJI Mini 2"], MASTS, corners, MOTION)
+        draw(stream(7, "motion", "test", i), cloud, TABLE["DJI Mini 2"], MASTS, corners, SETTINGS)
         for i in range(300)
     ]
     places = np.array([[drawn["x_m"], drawn["y_m"]] for drawn in rows])
@@ -87,7 +81,7 @@ def test_ground_targets_move_to_their_front_and_their_wheels_roll(name):
     cloud = make(records[name], None, 1)
     corners = region_polygon(MASTS, None)
     for index in range(4):
-        drawn = draw(stream(1, name, index), cloud, TABLE[name], MASTS, corners, MOTION)
+        drawn = draw(stream(1, name, index), cloud, TABLE[name], MASTS, corners, SETTINGS)
         velocity = np.array([drawn[f"v{axis}_mps"] for axis in "xyz"])
         speed = float(np.linalg.norm(velocity))
         assert TABLE[name]["speed_lo"] <= speed <= TABLE[name]["speed_hi"]
@@ -118,7 +112,7 @@ def test_the_hull_of_many_stations_is_the_region_and_bad_polygons_are_refused():
 @pytest.mark.parametrize(("cadence", "tied"), [("free", False), ("tied", True)])
 def test_cadence_follows_speed_only_where_tied(cadence, tied):
     cloud = recorded_cloud(origin_height_m=0.9, track_speed_mps=1.25)
-    settings = {**MOTION, "cadence": cadence}
+    settings = SETTINGS | {"cadence": cadence}
     ranges = {"speed_lo": 0.2, "speed_hi": 1.5}
     drawn = draw(stream(1, "m"), cloud, ranges, MASTS, region_polygon(MASTS, None), settings)
     speed = math.hypot(drawn["vx_mps"], drawn["vy_mps"])

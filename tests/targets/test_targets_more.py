@@ -23,7 +23,7 @@ from lowalt.targets.gallery import bones
 from lowalt.targets.make import make
 from lowalt.targets.records import estimates, load_records, records_of
 from lowalt.targets.skeleton import circle, joint
-from moving_clouds import row
+from moving_clouds import SETTINGS, row
 from tables import rows
 
 ROOT = Path(__file__).parents[2]
@@ -123,12 +123,8 @@ def test_every_cell_and_figure_without_a_source_is_called_an_estimate():
 
 
 def drawn(cloud, name, cadence="free", seed=1):
-    settings = {
-        "region": {"mast_clearance_m": 0},
-        "height_m": CONFIG["motion"]["height_m"],
-        "tilt_deg": 20.0,
-        "cadence": cadence,
-    }
+    heights = {"height_m": CONFIG["motion"]["height_m"], "region": {"mast_clearance_m": 0}}
+    settings = SETTINGS | heights | {"cadence": cadence}
     corners = np.array([[0.0, 0], [100, 0], [0, 100]])
     return draw(
         stream(seed, "draw"), cloud, RECORDS[name]["published"], np.zeros((1, 2)), corners, settings
