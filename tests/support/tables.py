@@ -8,7 +8,8 @@ FOLDER = Path(__file__).parents[1] / "data/tables"
 
 
 def rows(table: str, part: str) -> list[tuple]:
-    """Return the rows of a part of a table, each as its values in their order, for
-    `pytest.mark.parametrize`.
+    """Return the rows of a part of a table, each as its values in the order of the first row's keys,
+    for `pytest.mark.parametrize`.
     """
-    return [tuple(row.values()) for row in load_yaml(FOLDER / f"{table}.yaml")[part]]
+    found = load_yaml(FOLDER / f"{table}.yaml")[part]
+    return [tuple(row[key] for key in found[0]) for row in found]
