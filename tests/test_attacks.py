@@ -4,7 +4,6 @@ leave a folder.
 
 import io
 import itertools
-import json
 import os
 import pickle
 import struct
@@ -24,6 +23,7 @@ from lowalt.recognition import checkpoint
 from lowalt.shards import index
 from lowalt.targets.cloud import read as read_cloud
 from lowalt.tiles.png import SIGNATURE, _chunk, decode
+from made_indexes import index_of
 
 READERS = {reader.name: reader for reader in fuzzed_readers.readers()}
 
@@ -176,25 +176,6 @@ def test_a_palette_of_too_many_colours_is_refused_and_a_short_one_is_read():
     wrong = good.replace(_chunk(b"PLTE", bytes(768)), _chunk(b"PLTE", bytes(771)))
     with pytest.raises(InputError, match="palette of 771 bytes"):
         decode(wrong)
-
-
-def index_of(folder, **changes):
-    entry = {
-        "name": "a",
-        "path": "a.tar",
-        "group": "seen",
-        "fold": "train",
-        "samples": 1,
-        "bytes": 1,
-    }
-    entry |= {"table_sha256": "0" * 64, **changes}
-    render = {
-        name: load_yaml("config/default.yaml")[name] for name in ("network", "spectra", "images")
-    }
-    content = {"format": index.FORMAT, "kind": "image", "shards": [entry], "render": render}
-    content["sha256"] = index._checksum(content)
-    (folder / "index.json").write_text(json.dumps(content))
-    return folder / "index.json"
 
 
 def test_an_index_whose_shards_lie_elsewhere_or_are_no_shards_is_refused_though_its_checksum_is_right(

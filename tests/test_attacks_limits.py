@@ -115,28 +115,36 @@ STARTER = (
 )
 
 
-@pytest.mark.parametrize("handed", [True, False])
-def test_a_process_ends_with_its_starter_where_it_has_its_pipe(handed):
-    starter = subprocess.Popen(
-        [sys.executable, "-c", STARTER.format(job=JOB, handed=int(handed))],
+def started(job: str, handed: bool) -> subprocess.Popen:
+    """A process that holds a pipe and starts a job, to which it may hand the pipe."""
+    return subprocess.Popen(
+        [sys.executable, "-c", STARTER.format(job=job, handed=int(handed))],
         stdout=subprocess.PIPE,
         text=True,
         env=os.environ | {"PYTHONPATH": str(ROOT / "src"), PIPE: ""},
     )
-    job = 0
-    for line in starter.stdout:
-        job = job or (int(line) if line.strip().isdigit() else 0)
-        if "begun" in line:
-            break
-    assert lives(job)
+
+
+def left_by(starter: subprocess.Popen, processes: list[int], wait_s: float) -> list[int]:
+    """Kill a starter; return which of the processes live on after a while, and kill them."""
+    assert all(map(lives, processes))
     starter.send_signal(signal.SIGKILL)
     starter.wait()
-    stop = time.monotonic() + (10 if handed else 0.3)
-    while lives(job) and time.monotonic() < stop:
+    stop = time.monotonic() + wait_s
+    while any(map(lives, processes)) and time.monotonic() < stop:
         time.sleep(0.02)
-    assert lives(job) is not handed
-    if not handed:
-        os.kill(job, signal.SIGKILL)
+    still = [process for process in processes if lives(process)]
+    for process in still:
+        os.kill(process, signal.SIGKILL)
+    return still
+
+
+@pytest.mark.parametrize("handed", [True, False])
+def test_a_process_ends_with_its_starter_where_it_has_its_pipe(handed):
+    starter = started(JOB, handed)
+    said = {starter.stdout.readline().strip() for _ in range(2)}
+    (job,) = map(int, said - {"begun"})
+    assert left_by(starter, [job], 10 if handed else 0.3) == ([] if handed else [job])
 
 
 WORKERS = """
@@ -145,7 +153,8 @@ from lowalt.machine.run_pipe import end_with_starter
 from lowalt.machine.side_by_side import together
 
 def work():
-    print(os.getpid(), flush=True)
+    # One write, which that of the other worker cannot part.
+    os.write(1, b"%d\\n" % os.getpid())
     time.sleep(60)
 
 end_with_starter()
@@ -154,20 +163,6 @@ together([work, work], 2)
 
 
 def test_workers_of_a_job_end_with_the_job_s_starter():
-    starter = subprocess.Popen(
-        [sys.executable, "-c", STARTER.format(job=WORKERS, handed=1)],
-        stdout=subprocess.PIPE,
-        text=True,
-        env=os.environ | {"PYTHONPATH": str(ROOT / "src"), PIPE: ""},
-    )
-    job, *workers = [int(starter.stdout.readline()) for _ in range(3)]
-    assert lives(job) and all(map(lives, workers))
-    starter.send_signal(signal.SIGKILL)
-    starter.wait()
-    stop = time.monotonic() + 10
-    while any(map(lives, [job, *workers])) and time.monotonic() < stop:
-        time.sleep(0.02)
-    still = [process for process in workers if lives(process)]
-    for process in still:
-        os.kill(process, signal.SIGKILL)
-    assert not still
+    starter = started(WORKERS, True)
+    processes = [int(starter.stdout.readline()) for _ in range(3)]
+    assert left_by(starter, processes, 10) == []

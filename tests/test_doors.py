@@ -23,13 +23,16 @@ from lowalt.__main__ import main
 from lowalt.config.layers import overlaid
 from lowalt.files.errors import InputError, in_plain_characters
 from lowalt.files.shipped import SHIPPED
+from lowalt.files.yaml_files import load_yaml
 from lowalt.recognition import train_evaluate
 from lowalt.recognition.dataset_samples import opened
 from lowalt.recognition.recogniser import backbone
 from lowalt.shards import ShardSet, index
 from lowalt.shards.build import main as build_shards
+from lowalt.shards.remake import Remaker
 from lowalt.targets.records import load_table, with_row
 from lowalt.workflow.refusals import refuse_input
+from tables import rows
 
 EFFECT = """
 from pathlib import Path
@@ -123,31 +126,12 @@ def with_key(config: dict, key: str, value: object) -> dict:
     return config | {first: with_key(config.get(first, {}), rest, value)}
 
 
-CODE = {
-    "an effect by its absolute path": ("effects", {"{secret}/evil.py": {}}),
-    "an effect beside the run": ("effects", {"theirs/evil.py": {}}),
-    "an effect above": ("effects", {"../secret/evil.py": {}}),
-    "an effect among shipped ones": ("effects", {"adc": {}, "evil.py": {}}),
-}
-PLACES = {
-    "a file of an effect": ("effects", {"town": {"buildings": "{secret}/town.geojson"}}),
-    "the table of targets": ("targets.table", "{secret}/targets.csv"),
-    "the table of targets by a link": ("targets.table", "theirs/targets.csv"),
-    "records of targets above": ("targets.records", ["../secret/bird.yaml"]),
-    "records by a link": ("targets.records", ["config/targets/uav.yaml", "theirs/bird.yaml"]),
-    "own targets": ("targets.own", {"mine": "{secret}/bird.yaml"}),
-    "own targets by a folder's link": ("targets.own", {"mine": "theirs/folder/bird.yaml"}),
-    "a flight log": ("motion.track", "{secret}/track.csv"),
-    "a flight log that leaves the folder and returns": (
-        "motion.track",
-        "theirs/../../secret/track.csv",
-    ),
-    "the world's tape": ("targets.table", "/dev/zero"),
-}
-INPUTS = {
-    "a folder of inputs": ("inputs", "{secret}"),
-    "a folder of inputs by a link": ("inputs", "theirs/folder"),
-}
+ATTACKS = load_yaml(Path(__file__).parent / "data/tables/attacks.yaml")
+"""Keys of a configuration and what a stranger would have them hold, by name and kind of attack."""
+CODE = ATTACKS["code"]
+PLACES = ATTACKS["places"]
+INPUTS = ATTACKS["inputs"]
+TRAINING = ATTACKS["training"]
 
 
 @functools.cache
@@ -199,8 +183,14 @@ def zoo(doors):
     (doors / "results/zoo").symlink_to(SHIPPED / "results/zoo")
 
 
-@pytest.mark.parametrize("attack", [*CODE, *PLACES])
-@pytest.mark.parametrize("entry", ENTRIES)
+ALIKE = ("an effect beside the run", "the table of targets by a link", "a flight log")
+"""Attacks that every entry is given: code, a file that is read early and one that is read late."""
+PAIRS = {(entry, attack) for entry in ENTRIES for attack in ALIKE} | {
+    ("Dataset", attack) for attack in CODE | PLACES
+}
+
+
+@pytest.mark.parametrize(("entry", "attack"), sorted(PAIRS))
 def test_a_run_s_configuration_names_no_code_and_no_file_outside(doors, zoo, entry, attack, capsys):
     path = brought(doors, (CODE | PLACES)[attack])
     told = held(lambda: ENTRIES[entry](path), capsys)
@@ -215,51 +205,22 @@ def test_a_run_s_configuration_names_no_folder_of_inputs_outside(doors, entry, a
     assert "inputs is" in held(lambda: ENTRIES[entry](path), capsys)
 
 
-def stripped(doors: Path, whole: dict) -> str:
-    """A run's configuration without all but its effects."""
-    (doors / "theirs/config.yaml").write_text(yaml.safe_dump({"effects": whole["effects"]}))
-    return "theirs/config.yaml"
-
-
-def renamed(doors: Path, whole: dict) -> str:
-    """A whole configuration under the name of an overlay, outside of a run's folder."""
-    (doors / "scene.yaml").write_text(yaml.safe_dump(whole))
-    return "scene.yaml"
-
-
-def linked(doors: Path, whole: dict) -> str:
-    """A link with the name of an overlay to a stripped configuration."""
-    (doors / "scene.yaml").symlink_to(stripped(doors, whole))
-    return "scene.yaml"
-
-
-def beside_an_index(doors: Path, whole: dict) -> str:
-    """An overlay in the folder of a data set."""
-    path = "theirs/shards/scene.yaml"
-    (doors / path).write_text(yaml.safe_dump({"effects": whole["effects"]}))
-    return path
-
-
-def beside_a_run(doors: Path, whole: dict) -> str:
-    """An overlay in a run's folder."""
-    (doors / "theirs/scene.yaml").write_text(yaml.safe_dump({"effects": whole["effects"]}))
-    return "theirs/scene.yaml"
-
-
-def beside_a_model(doors: Path, whole: dict) -> str:
-    """An overlay in the folder of a trained model."""
-    (doors / "model").mkdir()
-    (doors / "model/model.safetensors").touch()
-    (doors / "model/scene.yaml").write_text(yaml.safe_dump({"effects": whole["effects"]}))
-    return "model/scene.yaml"
-
-
-@pytest.mark.parametrize(
-    "disguise", [stripped, renamed, linked, beside_an_index, beside_a_run, beside_a_model]
-)
+@pytest.mark.parametrize(("path", "beside", "whole", "linked"), rows("attacks", "disguises"))
 @pytest.mark.parametrize("entry", ["receive", "sample", "explain", "spectra", "run"])
-def test_a_run_s_configuration_is_known_in_every_disguise(doors, entry, disguise, capsys):
-    path = disguise(doors, attacked(doors, CODE["an effect beside the run"]))
+def test_a_run_s_configuration_is_known_in_every_disguise(
+    doors, entry, path, beside, whole, linked, capsys
+):
+    """A whole configuration or its effects alone, under any name, behind a link, and beside a file
+    that came with it.
+    """
+    config = attacked(doors, CODE["an effect beside the run"])
+    held_path = doors / (linked or path)
+    held_path.parent.mkdir(exist_ok=True)
+    held_path.write_text(yaml.safe_dump(config if whole else {"effects": config["effects"]}))
+    if linked:
+        (doors / path).symlink_to(held_path)
+    if beside:
+        (doors / beside).touch()
     assert "its effect 'theirs/evil.py' is code" in held(lambda: ENTRIES[entry](path), capsys)
 
 
@@ -282,19 +243,6 @@ def test_a_run_of_the_user_with_files_of_this_folder_and_the_package_is_read(doo
         path = brought(doors, attack)
         assert len(lowalt.Dataset(path))
         assert len(lowalt.receive(path, "Crow").times_s)
-
-
-TRAINING = {
-    "a file of weights": ("recognition.network.weights", "weights.pt"),
-    "weights beside the run": ("recognition.network.weights", "theirs/weights.pt"),
-    "weights elsewhere": ("recognition.network.weights", "{secret}/weights.pt"),
-    "weights of a hub": ("recognition.network.weights", "hub"),
-    "a backbone": ("recognition.network.backbone", "theirs/net.py:run"),
-    "a table of schemes elsewhere": ("recognition.table", "{secret}/schemes.csv"),
-    "a table of schemes above": ("recognition.table", "../secret/schemes.csv"),
-    "a table of schemes by a link": ("recognition.table", "theirs/schemes.csv"),
-    "a table of schemes that names code": ("recognition.table", "theirs/coded.csv"),
-}
 
 
 def reported(path: str) -> int:
@@ -370,7 +318,7 @@ def test_an_index_whose_images_need_the_instants_of_an_effect_runs_no_effect(doo
     content["sha256"] = index._checksum(content)
     (folder / "index.json").write_text(json.dumps(content))
     shards = ShardSet(folder / "index.json")
-    for ask in (shards.tile, shards.late, shards.images):
+    for ask in (shards.tile, shards.late, shards.images, lambda _: Remaker(shards, {})):
         assert "is code, which a file may not choose" in held(lambda ask=ask: ask(0))
 
 

@@ -12,6 +12,7 @@ from lowalt.files.errors import InputError
 from lowalt.motion import COLUMNS
 from lowalt.report.stage_times import COLUMNS as STAGE_COLUMNS
 from lowalt.shards.plan import Plan
+from tables import rows
 
 ROOT = Path(__file__).parents[2]
 SCHEMA = ROOT / "workflow/schemas/config.schema.yaml"
@@ -25,48 +26,7 @@ def test_every_shipped_configuration_is_valid(overlay):
 
 @pytest.mark.parametrize(
     ("overlay", "words"),
-    [
-        (
-            {"network": {"carrier_hz": 4.9}},
-            r"network.carrier_hz: value 4.9, expected at least 100000000",
-        ),
-        (
-            {"network": {"carrier_hz": "4.9 GHz"}},
-            r"network.carrier_hz: value '4.9 GHz', expected type number",
-        ),
-        ({"network": {"symbols": 0}}, r"network.symbols: value 0, expected at least 1"),
-        (
-            {"network": {"stations": {"A": {"position_m": [0, 0]}}}},
-            r"stations.A.position_m: .* at least 3 item",
-        ),
-        ({"noise": {"snr_db": []}}, r"noise.snr_db: value \[\], expected at least 1 item"),
-        ({"noise": {"snr_db": [3, 3]}}, r"noise.snr_db: .* every item once"),
-        ({"targets": {"select": ["Crow", "Crow"]}}, r"targets.select: .* every item once"),
-        ({"motion": {"region": {"polygn": 1}}}, r"motion.region: unknown key\(s\) \['polygn'\]"),
-        ({"split": {"by": "model"}}, r"split.by: value 'model', expected one of"),
-        ({"echo": {"tolerance": 0}}, r"echo.tolerance: value 0, expected more than 0"),
-        ({"echo": {"job": "all"}}, r"echo.job: value 'all', expected"),
-        ({"run": "../x"}, r"run: value '../x', expected text like"),
-        ({"run": "reference"}, r"run: value 'reference', expected none of"),
-        (
-            {"moton": {}},
-            r"^configuration refused: configuration: unknown key\(s\) \['moton'\], .* "
-            r"\['motion'\]$",
-        ),
-        ({"effects": {"adcs": {}}}, r"expected perhaps \['adc'\]$"),
-        ({"effects": None}, r"effects: value None, expected type object"),
-        ({"motion": {"tilt_deg": math.nan}}, r"motion.tilt_deg: value nan, expected type number"),
-        (
-            {"noise": {"snr_db": ["a", "b"]}},
-            r"refused: noise.snr_db.0: value 'a', expected number or inf$",
-        ),
-        ({"noise": {"snr_db": [500]}}, r"noise.snr_db.0: value 500, expected at most 300$"),
-        ({"network": {"stations": {1: {}}}}, r"key 1 among .*, expected text"),
-        (
-            {"network": {"stations": {"D": {"position_m": [1, 2, 3]}}}},
-            "[^\n]*expected position_m together with normal_deg$",
-        ),
-    ],
+    rows("configurations", "values"),
 )
 def test_a_wrong_value_is_refused_by_key_value_and_expectation(overlay, words):
     with pytest.raises(InputError, match=words):
@@ -121,13 +81,7 @@ def test_a_number_is_a_number_however_it_is_written(tmp_path):
 
 @pytest.mark.parametrize(
     ("text", "words"),
-    [
-        ("a: 1\na: 2\n", "stands twice"),
-        ("- 1\n", "expected a mapping"),
-        ("a: [\n", "not YAML"),
-        ("a: \0", r"not YAML [^\n]*$"),
-        ("__use_yte__: true\n?print(1): 2\n", "run code in it, expected a plain"),
-    ],
+    rows("configurations", "files"),
 )
 def test_a_broken_file_is_refused(tmp_path, text, words):
     path = tmp_path / "config.yaml"

@@ -12,6 +12,7 @@ from lowalt.config.layers import check, load, merge
 from lowalt.config.network import Network
 from lowalt.files.errors import InputError
 from lowalt.shards.sizes import sample_bytes
+from tables import rows
 
 ROOT = Path(__file__).parents[2]
 SCHEMA = ROOT / "workflow/schemas/config.schema.yaml"
@@ -75,35 +76,7 @@ def test_cubes_have_a_range_cell_for_each_sample():
 
 @pytest.mark.parametrize(
     ("network", "words"),
-    [
-        (
-            {"waveform": SWEEP, "subcarriers": 512},
-            r"^network: \{'subcarriers': 512\} .* kind 'fmcw', expected none of",
-        ),
-        (
-            {"waveform": {"kind": "cw"}, "guard_subcarriers": 0},
-            r"\{'guard_subcarriers': 0\} .* kind 'cw', expected",
-        ),
-        (
-            {"waveform": {**SWEEP, "sweep_s": 3e-3}},
-            r"sweep_s is 0.003, expected at most symbol_interval_s, 0.0025$",
-        ),
-        (
-            {"waveform": {"kind": "fmcw", "samples": 128}},
-            r"network.waveform: .*\{kind: fmcw, samples, sweep_hz, sweep",
-        ),
-        (
-            {"waveform": {"kind": "cw", "samples": 3}},
-            r"network.waveform: \{'kind': 'cw', 'samples': 3\}, expected",
-        ),
-        (
-            {"waveform": {**SWEEP, "kind": "ofdm"}},
-            r"network.waveform: .*, expected \{kind: ofdm\} or",
-        ),
-        ({"waveform": {"kind": "pulse"}}, r"network.waveform.kind: value 'pulse', expected one of"),
-        ({"waveform": {}}, r"network.waveform: missing key\(s\) \['kind'\]"),
-        ({"subcarriers": None}, r"network: missing key\(s\) \['subcarriers'\]"),
-    ],
+    rows("waveforms", "networks"),
 )
 def test_what_contradicts_a_waveform_is_refused_in_one_sentence(network, words):
     with pytest.raises(InputError, match=words) as refused:

@@ -88,16 +88,15 @@ def test_a_job_whose_kernels_are_compiled_loads_no_compiler(folder):
 
 
 def test_faults_are_named_and_leave_nothing_behind(folder):
-    with pytest.raises(InputError, match=r"missing \['network', 'tolerance'\]"):
-        main(command(folder, **{"--settings": "{}"}))
-    with pytest.raises(InputError, match="station 'D': not in the network"):
-        main(command(folder, **{"--station": "D"}))
-    with pytest.raises(InputError, match="tolerance is 2"):
-        main(command(folder, **{"--settings": json.dumps({"network": NETWORK, "tolerance": 2})}))
-    with pytest.raises(InputError, match=r"DJI Mini 2, model 0, station B: .*below the floor"):
-        main(
-            command(folder, **{"--settings": json.dumps({"network": NETWORK, "tolerance": 1e-15})})
-        )
+    close, loose = (json.dumps({"network": NETWORK, "tolerance": value}) for value in (1e-15, 2))
+    for changes, said in (
+        ({"--settings": "{}"}, r"missing \['network', 'tolerance'\]"),
+        ({"--station": "D"}, "station 'D': not in the network"),
+        ({"--settings": loose}, "tolerance is 2"),
+        ({"--settings": close}, r"DJI Mini 2, model 0, station B: .*below the floor"),
+    ):
+        with pytest.raises(InputError, match=said):
+            main(command(folder, **changes))
     write_table(folder / "chunk.csv", [row(0) | {"subtype": "Crow"}])
     with pytest.raises(InputError, match="Crow, model 0: no cloud"):
         main(command(folder))

@@ -38,15 +38,6 @@ def seen(name):
     return ranges, places[:, 1] / ranges, places[:, 2] / ranges
 
 
-def test_places_lie_as_far_away_in_the_direction_asked_for():
-    np.testing.assert_allclose(
-        away(7.0), [0, 0, 25] + 7 * np.array([1, 0.3, 0.1]) / np.sqrt(1.1), rtol=1e-15
-    )
-    np.testing.assert_allclose(away(5.0, 0.0, -3.0, 4.0), [0.0, -3.0, 29.0], rtol=1e-15)
-    np.testing.assert_allclose(cluster(90, 4000).mean(0), away(90), atol=0.05)
-    np.testing.assert_allclose(cluster(90, 4000).std(0), 0.5, atol=0.03)
-
-
 def test_every_case_is_as_hard_as_its_name_says():
     """Distances in cells and waves, angles and numbers: what makes each case hard."""
     for name in ("straight above", "at the beam's centre"):
@@ -70,15 +61,6 @@ def test_every_case_is_as_hard_as_its_name_says():
     for name, wanted in cells.items():
         assert seen(name)[0][:-1] / CELL == pytest.approx([wanted], rel=1e-12)
     assert seen("past the unambiguous range")[0] / CELL == pytest.approx(1.7 * 256, rel=0.1)
-    metres = {"at 1 cm": 0.01, "at 100 km": 1e5, "100 km at 77 GHz": 1e5, "one point": 77.7}
-    for name, wanted in metres.items():
-        assert seen(name)[0][:-1] == pytest.approx([wanted] * (len(seen(name)[0]) - 1), rel=2e-5)
-    assert (
-        CASES["100 km at 77 GHz"].station.frequency_hz
-        == CASES["100 km at 77 GHz"].network.carrier_hz
-        == 77e9
-    )
-    assert len(CASES["one point"].points_m) == 1
     sizes = np.ptp(CASES["larger than its range"].points_m, axis=0)
     assert sizes.max() > seen("larger than its range")[0][-1]
     # A way there and back that differs by half a wave of the middle subcarrier.

@@ -15,6 +15,7 @@ from forks import printed
 from lowalt.echo.fast.driver import run
 from lowalt.echo.pointwise.results import matrix
 from lowalt.files.errors import InputError
+from lowalt.files.yaml_files import load_yaml
 from lowalt.machine.jit import INNER, LEAN, digest
 from lowalt.machine.machine_code import _DigestCache, dispatcher
 
@@ -39,47 +40,8 @@ print(digest(run.function), digest(matrix.function))
 """Edits a source file of a copy of the package and prints the digests of two of the echo's kernels.
 """
 
-# file, text, its replacement, and whether the keys of both kernels change by it
-EDITS = {
-    "nothing": ("echo/api.py", "import numpy as np", "import numpy as np", [0, 0]),
-    "a module without kernels": (
-        "echo/api.py",
-        "import numpy as np",
-        "import numpy as np\nUNUSED = 1",
-        [0, 0],
-    ),
-    "a function that is not compiled": (
-        "echo/fast/polynomials.py",
-        "nodes = min(count, MOST_RATES)",
-        "nodes = 31",
-        [0, 0],
-    ),
-    "a comment in a kernel": (
-        "echo/fast/vector_loops.py",
-        "    k = degree",
-        "    # Why.\n    k = degree",
-        [0, 0],
-    ),
-    "a called kernel": (
-        "echo/fast/vector_loops.py",
-        "k = degree - first",
-        "k = degree - first + 0",
-        [1, 0],
-    ),
-    "a kernel called by a called one": (
-        "echo/fast/polynomials.py",
-        "half = 0.5 * band",
-        "half = band * 0.5",
-        [1, 0],
-    ),
-    "a constant": ("echo/fast/cell_kernel.py", "SIDE = 4", "SIDE = 3", [1, 0]),
-    "the settings of a called kernel": (
-        "echo/pointwise/terms.py",
-        "@PLAIN\ndef dirichlet",
-        "@LEAN\ndef dirichlet",
-        [0, 1],
-    ),
-}
+EDITS = load_yaml("tests/data/tables/source_edits.yaml")
+"""Edits of sources: a file, a text, its replacement, and whether the keys of both kernels change."""
 
 
 @pytest.fixture(scope="module")
@@ -89,7 +51,10 @@ def digests(tmp_path_factory):
     shutil.copytree(
         Path(lowalt.__file__).parent, place, ignore=shutil.ignore_patterns("__pycache__")
     )
-    programs = [PROGRAM.format((str(place), *edit[:3])) for edit in EDITS.values()]
+    programs = [
+        PROGRAM.format((str(place), edit["file"], edit["text"], edit["replacement"]))
+        for edit in EDITS.values()
+    ]
     return dict(zip(EDITS, map(str.split, printed(programs)), strict=True))
 
 
@@ -97,7 +62,7 @@ def digests(tmp_path_factory):
 def test_the_key_changes_with_what_is_compiled_alone(case, digests):
     before = digests["nothing"]
     assert [int(new != old) for new, old in zip(digests[case], before, strict=True)] == EDITS[case][
-        -1
+        "changes"
     ]
 
 
@@ -175,15 +140,6 @@ print((found == written).all())
 """
 
 
-def test_products_of_complex_numbers_are_fused_in_no_kernel_that_is_done_as_written(tmp_path):
-    # numba compiles such a product once for all kernels, with the options of the first one.
-    (tmp_path / "products.py").write_text(PRODUCTS)
-    ended = subprocess.run(
-        [sys.executable, "products.py"], cwd=tmp_path, capture_output=True, text=True
-    )
-    assert ended.stdout == "True\n", ended.stderr
-
-
 SHARED = """
 import platform
 import numpy as np
@@ -210,14 +166,6 @@ written = (a.real * b.real - a.imag * b.imag) + 1j * (a.real * b.imag + a.imag *
 fuses = platform.machine() != "x86_64" or "+fma" in cpu_target.target_context.codegen().magic_tuple()[2]
 print((found == written).all() != fuses)
 """
-
-
-def test_plain_numba_still_compiles_a_product_once_for_all_kernels(tmp_path):
-    (tmp_path / "shared.py").write_text(SHARED)
-    ended = subprocess.run(
-        [sys.executable, "shared.py"], cwd=tmp_path, capture_output=True, text=True
-    )
-    assert ended.stdout == "True\n", ended.stderr
 
 
 CALLED = """
@@ -253,15 +201,18 @@ for kind in (INNER, LEAN, PLAIN, VECTOR):
 """
 
 
-def test_a_function_done_as_written_stays_so_for_a_first_caller_that_may_fuse(tmp_path):
-    # An option that a function does not give, numba takes from the function that calls it first.
-    # The last kind is a
-    # control: it is fused where the processor has such instructions.
-    (tmp_path / "called.py").write_text(CALLED)
+@pytest.mark.parametrize(("program", "kinds"), [(PRODUCTS, 1), (SHARED, 1), (CALLED, 4)])
+def test_products_are_fused_in_no_kernel_that_is_done_as_written(program, kinds, tmp_path):
+    """numba compiles such a product once for all kernels, with the options of the first one, and
+    takes an option that a function does not give from the function that calls it first. Its own
+    kernels, and the last kind of those that are called, are controls: they are fused where the
+    processor has such instructions.
+    """
+    (tmp_path / "products.py").write_text(program)
     ended = subprocess.run(
-        [sys.executable, "called.py"], cwd=tmp_path, capture_output=True, text=True
+        [sys.executable, "products.py"], cwd=tmp_path, capture_output=True, text=True
     )
-    assert ended.stdout == "True\n" * 4, ended.stderr
+    assert ended.stdout == "True\n" * kinds, ended.stderr
 
 
 def test_the_key_of_kept_code_has_the_kernel_s_own_options():

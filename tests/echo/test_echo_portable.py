@@ -15,11 +15,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from builtin_records import RECORDS
 from craft import NETWORK, craft, row
 from lowalt.config.network import Network
 from lowalt.echo.chunk import clean_signals
 from lowalt.motion import poses
-from lowalt.targets.cloud import Cloud
+from lowalt.targets.make import make
+from moving_clouds import recorded_cloud
 
 NEW = "X86_V4 AVX512_ICL AVX512_SPR"
 OLD = "X86_V3 AVX2 FMA3"
@@ -35,66 +37,13 @@ PROCESSORS = {
 }
 
 
-def bird() -> Cloud:
-    """A body and a wing of two hinged segments."""
-    rng = np.random.default_rng(1)
-    nothing = [np.nan] * 3
-    flap = {
-        "mean_deg": 15.0,
-        "amplitude_deg": 40.0,
-        "fold_amplitude_deg": 30.0,
-        "fold_lag_deg": 90.0,
-    }
-    return Cloud(
-        points=rng.normal(scale=0.3, size=(45, 3)),
-        part=np.repeat(np.arange(3), 15),
-        kinds=("body", "wing", "wing"),
-        names=("body", "inner", "outer"),
-        parents=np.array([-1, -1, 1]),
-        hinges=np.array([nothing, [0.1, 0.0, 0.0], [0.4, 0.0, 0.0]]),
-        axes=np.array([nothing, [0.0, 1.0, 0.0], [0.0, 1.0, 0.0]]),
-        normals=np.full((45, 3), np.nan),
-        rcs_m2=rng.uniform(0.1, 2.0, 45),
-        record={
-            "subtype": "Crow",
-            "category": "Bird",
-            "source": "test",
-            "checksum": "0",
-            "flap": flap,
-        },
-    )
-
-
-def walker() -> Cloud:
-    """Seven nodes of a cyclic recording."""
-    rng = np.random.default_rng(2)
-    nothing = np.full((7, 3), np.nan)
-    return Cloud(
-        points=np.zeros((7, 3)),
-        part=np.arange(7),
-        kinds=("node",) * 7,
-        names=tuple(f"node {i}" for i in range(7)),
-        parents=np.full(7, -1),
-        hinges=nothing,
-        axes=nothing,
-        normals=nothing,
-        rcs_m2=np.ones(7),
-        record={
-            "subtype": "Walker",
-            "category": "Pedestrian",
-            "source": "test",
-            "checksum": "0",
-            "track_rate_hz": 120.0,
-        },
-        track=rng.normal(scale=0.5, size=(130, 7, 3)),
-    )
-
-
 def digest(count: int) -> str:
     """SHA-256 of the poses and of the stored signals of `count` motion models of each target."""
     network = Network.from_settings(NETWORK | {"symbols": 400})
     total = hashlib.sha256()
-    for cloud, more in ((craft(), {}), (bird(), {}), (walker(), {"start_s": 0.3, "playback": 0.9})):
+    crow = make(RECORDS["Crow"], None, 1)
+    played = {"start_s": 0.3, "playback": 0.9}
+    for cloud, more in ((craft(), {}), (crow, {}), (recorded_cloud(), played)):
         for model in range(count):
             motion = row(model) | more | {"subtype": cloud.subtype, "rate_hz": 3.7 + model}
             for array in poses(cloud, motion, network.times_s):

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.polynomial.polynomial import polyval
 from scipy.spatial.transform import Rotation
-from test_echo import cloud_in_motion, network, positions
+from test_echo import cloud_in_motion, heard, network, positions
 
 import pointwise_echo
 from lowalt.config.network import Station
@@ -138,9 +138,7 @@ def bounded(monkeypatch, plan: dict, cells: dict, array: tuple[int, int] = (16, 
             "cell_polynomials",
             lambda *given: tabulated(*given)._replace(**{"error": 0.0} | cells),
         )
-        found = echo_signal(
-            net, net.stations[0], motion, 1.0, motion.translation[0, 0], SMALL * 100
-        )
+        found = heard(net, motion, SMALL * 100)
     places = positions(motion)[0]
     r = np.linalg.norm(places - net.stations[0].position_m, axis=1)
     # The weights of both arrays have unit norm: a0 G is the number of elements of one.
@@ -302,9 +300,7 @@ def test_the_plan_follows_size_range_and_tolerance(always_approximate):
         ((2000, 30, 60), 30.0, 1e-3, "general"),
     ):
         motion = cloud_in_motion(np.random.default_rng(2), 60, 50, away_m, size_m, 1.0)
-        method = echo_signal(
-            net, net.stations[0], motion, 1.0, motion.translation[0, 0], tolerance
-        ).method
+        method = heard(net, motion, tolerance).method
         counts = {"cheap": method.cheap, "exact": method.exact, "general": method.general}
         assert (
             sum(counts.values()) == 60
@@ -313,10 +309,7 @@ def test_the_plan_follows_size_range_and_tolerance(always_approximate):
         )
     few = network(symbols=refine.PROBES)
     motion = cloud_in_motion(np.random.default_rng(2), refine.PROBES, 50, (200, 30, 60), 0.3)
-    assert (
-        echo_signal(few, few.stations[0], motion, 1.0, motion.translation[0, 0], 1e-3).method.cheap
-        == 0
-    )
+    assert heard(few, motion, 1e-3).method.cheap == 0
 
 
 def test_a_lead_that_a_cheap_plan_cannot_prove_is_left_to_the_exact_one(always_approximate):
@@ -330,7 +323,4 @@ def test_a_lead_that_a_cheap_plan_cannot_prove_is_left_to_the_exact_one(always_a
 def test_a_tolerance_that_saves_little_takes_the_exact_plan():
     net = network(symbols=60)
     motion = cloud_in_motion(np.random.default_rng(2), 60, 50, (200, 30, 60), 0.3)
-    assert (
-        echo_signal(net, net.stations[0], motion, 1.0, motion.translation[0, 0], 1e-3).method.exact
-        == 60
-    )
+    assert heard(net, motion, 1e-3).method.exact == 60

@@ -26,6 +26,12 @@ def met(folder, number):
     return number, os.getpid()
 
 
+def marked(path):
+    """Leave a file, and take so long that an error is seen before many such calls have begun."""
+    path.touch()
+    time.sleep(0.05)
+
+
 def gone():
     os.kill(os.getpid(), signal.SIGKILL)
 
@@ -50,7 +56,7 @@ def test_one_job_stays_in_this_process():
 
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_an_error_is_that_of_the_call_and_calls_not_begun_are_left_out(jobs, tmp_path):
-    late = [partial((tmp_path / str(number)).touch) for number in range(20)]
+    late = [partial(marked, tmp_path / str(number)) for number in range(20)]
     with pytest.raises(InputError, match=r"^table\.csv: expected something else$"):
         together([partial(refused, "table.csv"), partial(told, 0, 0.3), *late], jobs)
     assert len(list(tmp_path.iterdir())) < 20

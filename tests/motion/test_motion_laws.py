@@ -16,7 +16,7 @@ from lowalt.numerics.streams import stream
 from lowalt.targets.cloud import extent
 from lowalt.targets.make import make
 from lowalt.targets.records import load_records
-from moving_clouds import recorded_cloud
+from moving_clouds import SETTINGS, recorded_cloud
 
 ROWS = 600
 SQUARE = [[0.0, 0.0], [400.0, 0.0], [400.0, 300.0], [0.0, 300.0]]
@@ -24,11 +24,8 @@ SQUARE = [[0.0, 0.0], [400.0, 0.0], [400.0, 300.0], [0.0, 300.0]]
 far away.
 """
 MAST = np.array([[-500.0, -500.0]])
-MOTION = {
+MOTION = SETTINGS | {
     "region": {"polygon_m": SQUARE, "mast_clearance_m": 10.0},
-    "height_m": {"UAV": [30.0, 150.0], "Bird": [20.0, 120.0]},
-    "tilt_deg": 20.0,
-    "cadence": "free",
     "sizes_m": {"UAV": [0.2, 3.0], "Vehicle": [2.0, 8.0]},
 }
 NAMES = {

@@ -31,6 +31,8 @@ from lowalt.shards.sample_record import record, row_of
 from lowalt.shards.write import select
 from lowalt.targets.cloud import write as write_cloud
 from lowalt.workflow.stages.motion import MotionStage
+from options import words
+from tables import rows
 
 SUBTYPES = ["DJI Mini 2", "Owl", "NIO ET5T 2023", "Walking Pedestrian 5"]
 LOOKS = 12
@@ -258,22 +260,9 @@ def test_the_motion_stage_writes_the_rows_of_the_samples(which, request, tmp_pat
     cloud, path, again = (tmp_path / name for name in ("cloud.npz", "motion.csv", "again.csv"))
     write_cloud(cloud, tracks.clouds[SUBTYPES[0]])
     wildcards = type("", (), {"group": "seen", "part": "00000"})()
-    motion(
-        [
-            "--settings",
-            stage.settings(wildcards),
-            "--clouds",
-            str(cloud),
-            "--group",
-            "seen",
-            "--first",
-            "0",
-            "--count",
-            str(4 * LOOKS),
-            "--out",
-            str(path),
-        ]
-    )
+    settings = stage.settings(wildcards)
+    span = {"group": "seen", "first": 0, "count": 4 * LOOKS}
+    motion(words(settings=settings, clouds=cloud, **span, out=path))
     numbers = [(row["model"], row["track"], row["look"]) for row in read_table(path)]
     assert numbers == [(number, *divmod(number, LOOKS)) for number in range(4 * LOOKS)]
     write_table(again, [row for track in range(4) for row in looks_of(tracks, SUBTYPES[0], track)])
@@ -338,25 +327,7 @@ def test_degrees_become_metres_about_the_first_row(tmp_path, dataset):
 
 @pytest.mark.parametrize(
     ("text", "words"),
-    [
-        (
-            "time_s,x_m,y_m\n0,1,2\n",
-            r"columns \['time_s', 'x_m', 'y_m'\], expected two or more of \['time_s', 'x_m'",
-        ),
-        ("x_m,y_m,z_m\n0,1,2\n", r"lacks the columns \['time_s'\]"),
-        (LOG, "0 rows"),
-        (LOG + "0,250,99,40\n1,250,up,40\n", "line 3, column y_m: 'up', expected a number"),
-        (LOG + "0,250,99,40\n1,250,nan,40\n", "line 3, column y_m: 'nan', expected a number"),
-        (
-            LOG + "0,250,99,40\n2,250,99,40\n2,250,99,40\n",
-            "line 4, column time_s: 2 after 2, expected times that inc",
-        ),
-        (LOG + "0,250,99,40\n11,250,99,40\n", "11 s long, expected 12 s for motion.looks 12"),
-        (
-            LOG + "0,250,99,40\n20,2250,99,40\n",
-            r"2 s after its start at \(450.0, 99.0\) m, outside the cell",
-        ),
-    ],
+    rows("tracks", "logs"),
 )
 def test_a_bad_log_is_refused_in_one_sentence(tmp_path, text, words):
     path = tmp_path / "log.csv"
@@ -369,15 +340,7 @@ def test_a_bad_log_is_refused_in_one_sentence(tmp_path, text, words):
 
 @pytest.mark.parametrize(
     ("overlay", "words"),
-    [
-        (
-            {"split": {"by": "sample"}},
-            "split.by: 'sample' together with motion.looks, expected 'motion'",
-        ),
-        ({"effects": {"gusts": {}}}, r"effects: \['gusts'\] together with motion.looks"),
-        ({"motion": {"track": "nowhere.csv"}}, "motion.track: 'nowhere.csv' is not there"),
-        ({"motion": {"track": "README.md", "looks": None}}, "looks"),
-    ],
+    rows("tracks", "overlays"),
 )
 def test_what_does_not_go_with_tracks_is_refused(overlay, words):
     with pytest.raises(InputError, match=words):

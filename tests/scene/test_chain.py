@@ -15,10 +15,10 @@ from lowalt.echo import echo_signal
 from lowalt.numerics.streams import stream
 from lowalt.scene import waveform
 from lowalt.scene.chain import SceneSample, received_signal
-from lowalt.scene.effects.channel import interference, reflected_aspect, walls
+from lowalt.scene.effects.channel import interference, walls
 from lowalt.scene.laws.offsets import of_stations
 from lowalt.scene.observe import observe
-from lowalt.scene.response import ImagePath, response
+from lowalt.scene.response import response
 from scenes import A, B, network, scene, target, view_of
 
 
@@ -186,33 +186,6 @@ FACADES = {
 def test_on_a_link_every_path_out_meets_every_path_back():
     """Both ends see unlike numbers of paths: A sees all of three facades, B one."""
     assert seen_paths(link_of({"walls": FACADES}), walls, FACADES) == [3, 1]
-
-
-def test_on_a_link_the_change_of_the_direct_path_shows_the_direct_paths_side():
-    """What a building takes from the direct path is weighted as that path.
-
-    So a blocked one is silent.
-    """
-    view = link_of({"walls": FACADES}).view
-    change = ImagePath(view.places, -1.0, None, ImagePath(view.places, 0.0))
-    mirror = np.array([120.0, 10.0, -12.0])
-    reflected = ImagePath(
-        view.places, 0.5, None, ImagePath(view.places, 0.5, np.array([0.0, 0.0, -10.0]))
-    )
-    both = ImagePath(view.places, 0.5, mirror, ImagePath(view.places, 0.5))
-
-    def weight(seen, one_sided):
-        """A bistatic side that is not the geometric mean of both ends' sides."""
-        if not one_sided:
-            return np.ones(view.places.shape[:2])
-        sender, receiver = seen.masts_m
-        return np.full(view.places.shape[:2], 1.0 + abs(sender[2] - 3.0 * receiver[2]))
-
-    found = reflected_aspect.routes({}, view, [change, reflected, both], weight)[:, :, 0, 0]
-    np.testing.assert_array_equal(found[:2, :2][[0, 0, 1], [0, 1, 1]], found[0, 0])
-    assert found[0, 0] == 1.0 + abs(10.0 - 36.0)
-    assert found[2, 2] == 1.0 + abs(-10.0 - 36.0)
-    assert found[3, 3] == 1.0 + abs(10.0 + 36.0)
 
 
 def test_without_effects_the_signal_is_the_echo_engines_to_the_last_bit():

@@ -54,10 +54,10 @@ def facing(count: int, kinds=("body", "rotor")):
 
 
 def test_an_element_has_its_3db_widths_and_its_front_to_back():
-    element = Element(downtilt_deg=0.0)
     far = 1e5
 
-    def toward(azimuth_deg: float, up_deg: float) -> float:
+    def toward(azimuth_deg: float, up_deg: float, **changes: float) -> float:
+        element = Element(**{"downtilt_deg": 0.0, **changes})
         a = A.normal_rad + np.radians(azimuth_deg)
         u = np.radians(up_deg)
         away = far * np.array([np.cos(u) * np.cos(a), np.cos(u) * np.sin(a), np.sin(u)])
@@ -67,22 +67,9 @@ def test_an_element_has_its_3db_widths_and_its_front_to_back():
     for off in ((32.5, 0), (-32.5, 0), (0, 32.5), (0, -32.5)):
         assert toward(*off) == pytest.approx(5.0)
     assert toward(180, 0) == pytest.approx(-22.0)
-    element = Element(downtilt_deg=0.0, back_db=20.0)
-    assert toward(180, 0) == pytest.approx(-12.0) and toward(32.5, 0) == pytest.approx(5.0)
-    tilted = gain(
-        Element(downtilt_deg=10.0),
-        A,
-        np.array(A.position_m)
-        + far
-        * np.array(
-            [
-                np.cos(A.normal_rad) * np.cos(np.pi / 18),
-                np.sin(A.normal_rad) * np.cos(np.pi / 18),
-                -np.sin(np.pi / 18),
-            ]
-        ),
-    )
-    assert 10 * np.log10(tilted) == pytest.approx(8.0)
+    assert toward(180, 0, back_db=20.0) == pytest.approx(-12.0)
+    assert toward(32.5, 0, back_db=20.0) == pytest.approx(5.0)
+    assert toward(0, -10, downtilt_deg=10.0) == pytest.approx(8.0)
 
 
 def test_an_elements_pattern_weighs_both_ways():
@@ -354,17 +341,17 @@ def test_routes_show_the_sides_that_their_images_see(station):
     ]
 
     def weight(view: View, one_sided: bool) -> np.ndarray:
-        """A follower's factor that tells a place from another, and one of all others that does not."""
-        ends = [np.sum(np.square(end.station.position_m)) for end in view.ends()]
-        followed = (2.0 + np.sin(ends[0])) * (2.0 + np.sin(ends[-1]))
-        return np.full(view.places.shape[:2], followed if one_sided else 3.0)
-
-    found = reflected_aspect.routes(reflected_aspect.DEFAULTS, view, paths, weight)
-    assert found.shape == (3, 3, *view.places.shape[:2])
+        """A follower's factor that is no product of both ends' factors, and one of all others that
+        tells no place from another.
+        """
+        ends = [side(end.station.position_m) for end in view.ends()]
+        return np.full(view.places.shape[:2], ends[0] + 5 * ends[-1] if one_sided else 3.0)
 
     def side(place) -> float:
         return 2.0 + np.sin(np.sum(np.square(place)))
 
+    found = reflected_aspect.routes(reflected_aspect.DEFAULTS, view, paths, weight)
+    assert found.shape == (3, 3, *view.places.shape[:2])
     sender = station.transmitter or station
     out = [
         side(sender.position_m),
@@ -372,7 +359,15 @@ def test_routes_show_the_sides_that_their_images_see(station):
         side(sender.position_m),
     ]
     back = [side(station.position_m), side(images[0]), side(station.position_m)]
-    np.testing.assert_allclose(found[..., 0, 0], 3.0 * np.outer(out, back), rtol=1e-12)
+    expected = np.empty((3, 3))
+    for a, b in np.ndindex(expected.shape):
+        # A path without an image of the station shows the direct one's side: it is what a building
+        # takes from the direct path, and must cancel it where it is blocked.
+        if a == b or 1 not in (a, b):
+            expected[a, b] = out[a] + 5 * back[b]
+        else:
+            expected[a, b] = np.sqrt(6 * out[a] * 6 * back[b])
+    np.testing.assert_allclose(found[..., 0, 0], 3.0 * expected, rtol=1e-12)
 
 
 def test_companions_stand_clear_of_each_other_and_fly_alike():

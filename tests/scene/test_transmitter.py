@@ -5,9 +5,9 @@ import pytest
 from scipy.integrate import quad
 
 from lowalt.numerics.streams import stream
-from lowalt.scene import lateness, waveform
+from lowalt.scene import waveform
 from lowalt.scene.effects.transmitter import comb_pilots, data_symbols, power_amplifier, slow_time
-from scenes import A, network
+from scenes import network
 
 
 @pytest.mark.parametrize(("order", "rise_db"), [(16, 2.76), (64, 4.29)])
@@ -83,15 +83,3 @@ def test_regridding_restores_a_line_as_far_as_its_kind_can():
     assert abs(line).argmax() == 190 and abs(line[190]) == pytest.approx(
         timing.present.sum(), rel=1e-9
     )
-
-
-def test_lateness_is_drawn_again_from_the_name_of_a_sample():
-    radio = network()
-    row = {"subtype": "Thing", "model": 3}
-    effects = {"slow_time": {"jitter_s": 1e-4}}
-    again = lateness.lateness({"times": "known"}, effects, radio, 5, row)
-    rng = stream(5, "effect", "slow_time", "Thing", 3, A.name)
-    own = slow_time.sampling(slow_time.DEFAULTS | effects["slow_time"], radio, rng)
-    np.testing.assert_allclose(again[0], (own.times_s - radio.times_s) / 2.5e-3, rtol=1e-12)
-    assert lateness.lateness({"times": "even"}, effects, radio, 5, row) is None
-    assert lateness.lateness({"times": "known"}, {}, radio, 5, row) is None

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from test_dataset import configuration, run_stages
+from test_dataset import configuration
 
 from lowalt.__main__ import main
 from lowalt.config.layers import plain
@@ -21,6 +21,7 @@ from lowalt.shards.sizes import sample_bytes
 from lowalt.shards.stored_cubes import restored, rounded
 from lowalt.spectra.cube import TRUTH
 from lowalt.workflow import space
+from stage_runs import run_stages
 
 
 def values(parts) -> np.ndarray:

@@ -4,7 +4,6 @@ without end.
 
 import itertools
 import json
-import math
 import pickle
 import shutil
 from pathlib import Path
@@ -14,25 +13,19 @@ import pytest
 
 import lowalt
 from lowalt.__main__ import main as lowalt_command
-from lowalt.config.command import settings
-from lowalt.config.layers import canonical
-from lowalt.echo.__main__ import main as echo
-from lowalt.files.atomic import slug
+from lowalt.config.layers import merge
 from lowalt.files.errors import InputError
-from lowalt.motion.__main__ import main as motion
-from lowalt.noise.__main__ import main as noise
 from lowalt.shards import ShardSet, card
 from lowalt.shards import dataset as module
-from lowalt.shards.__main__ import main as shards
 from lowalt.shards.build import write_run
 from lowalt.shards.dataset import Dataset, Endless
 from lowalt.targets import occluders
 from lowalt.targets.cloud import read
 from lowalt.targets.cloud import write as write_cloud
 from lowalt.targets.records import records_of
-from lowalt.tiles.__main__ import main as tiles
 from lowalt.tiles.png import decode
 from small_configuration import configuration as usual
+from stage_runs import check_members, run_stages
 
 ROOT = Path(__file__).parents[2]
 
@@ -48,113 +41,14 @@ def dataset():
     return Dataset(configuration())
 
 
-def run_stages(dataset: Dataset, folder: Path, kind: str) -> Path:
-    """Run the stages' own commands over a whole small data set; return the index."""
-    config = dataset.config
-    plan = dataset.plan
-    stations = list(config["network"]["stations"])
-    for name, cloud in dataset.clouds.items():
-        write_cloud(folder / "clouds" / f"{slug(name)}.npz", cloud)
-    written = []
-    for chunk in plan.chunks:
-        group = chunk.partition("-")[0]
-        clouds = [str(folder / "clouds" / f"{slug(name)}.npz") for name in plan.groups[group]]
-        places = [place["position_m"][:2] for place in config["network"]["stations"].values()]
-        kept = {key: config["motion"][key] for key in ("region", "height_m", "tilt_deg", "cadence")}
-        published = {name: dataset.published[name] for name in plan.groups[group]}
-        block = canonical(
-            {"seed": config["seed"], "masts_m": places, "motion": kept, "published": published}
-        )
-        table, noisy, drawn = (str(folder / f"{chunk}{end}") for end in (".csv", ".npy", ".npz"))
-        first, count = plan.span(chunk)
-        motion(
-            [
-                "--settings",
-                block,
-                "--clouds",
-                *clouds,
-                "--group",
-                group,
-                "--first",
-                str(first),
-                "--count",
-                str(count),
-                "--out",
-                table,
-            ]
-        )
-        heard = [str(folder / f"{chunk}-{station}.npy") for station in stations]
-        block = canonical({"network": config["network"], "tolerance": config["echo"]["tolerance"]})
-        echo(
-            [
-                "--settings",
-                block,
-                "--motion",
-                table,
-                "--clouds",
-                *clouds,
-                "--station",
-                *stations,
-                "--out",
-                *heard,
-            ]
-        )
-        block = canonical(
-            {"seed": config["seed"], "stations": stations, "snr_db": config["noise"]["snr_db"]}
-        )
-        noise(["--settings", block, "--motion", table, "--echoes", *heard, "--out", noisy])
-        render = {key: config[key] for key in ("network", "spectra", "images")}
-        tiles(["--settings", canonical(render), "--signals", noisy, "--out", drawn])
-        block = {key: config[key] for key in ("seed", "network", "split")}
-        block |= {"snr_db": config["noise"]["snr_db"], "shards": {**config["shards"], "kind": kind}}
-        for name in plan.folds(chunk):
-            written.append(
-                str(folder / "shards" / f"{group}-{name}-{chunk.rpartition('-')[2]}.tar")
-            )
-            given = (
-                ["--echoes", *heard] if kind == "recipe" else ["--signals", noisy, "--tiles", drawn]
-            )
-            if kind == "cube":
-                given += ["--clouds", *clouds]
-                block |= {
-                    "echo": {"tolerance": config["echo"]["tolerance"], "effects": config["effects"]}
-                }
-            shards(
-                [
-                    "write",
-                    "--settings",
-                    canonical(block),
-                    "--motion",
-                    table,
-                    *given,
-                    "--fold",
-                    name,
-                    "--out",
-                    written[-1],
-                ]
-            )
-    render |= {"echo": {"tolerance": config["echo"]["tolerance"], "effects": config["effects"]}}
-    index = folder / "shards" / "index.json"
-    shards(["index", "--settings", canonical(render), "--shards", *written, "--out", str(index)])
-    return index
-
-
 @pytest.fixture(scope="module", params=["image", "signal", "recipe", "cube"])
 def index(request, dataset, tmp_path_factory):
     return run_stages(dataset, tmp_path_factory.mktemp(request.param), request.param)
 
 
 def test_every_sample_has_the_bytes_of_its_shard(dataset, index):
-    stored = ShardSet(index)
-    numbers = {key.decode(): number for number, key in enumerate(stored.keys.tolist())}
-    assert len(dataset) == len(stored) == 3 * 4 * 2
-    for number in range(len(dataset)):
-        place = numbers[dataset.key(number)]
-        assert dataset.members(number, stored.kind) == stored.members(place)
-        assert dataset.record(number) == {
-            key: value for key, value in stored.record(place).items() if key != "cube"
-        }
-        assert dataset.labels[number] == stored.labels[place]
+    assert len(dataset) == 3 * 4 * 2
+    check_members(dataset, ShardSet(index))
 
 
 def test_a_whole_data_set_is_written_without_the_workflow(dataset, index, tmp_path):
@@ -166,22 +60,28 @@ def test_a_whole_data_set_is_written_without_the_workflow(dataset, index, tmp_pa
         ), path.name
 
 
+def remade(capsys, index, *words) -> tuple[int, str]:
+    """The exit status of the command `remake`, and what it says."""
+    status = lowalt_command(["remake", str(index), *map(str, words)])
+    return status, "".join(capsys.readouterr())
+
+
 def test_a_stored_sample_is_made_again_and_another_is_told(index, tmp_path, capsys):
     key = ShardSet(index).keys[0].decode()
-    assert lowalt_command(["remake", str(index), key]) == 0
-    assert "1 samples made again" in capsys.readouterr().out
-    assert lowalt_command(["remake", str(index), "crow-000000-snrinf"]) == 2
-    assert "not in" in capsys.readouterr().err
     clouds = shutil.copytree(index.parent.parent / "clouds", tmp_path / "clouds")
     for path in clouds.iterdir():
         cloud = read(path)
         cloud.points[:] *= 1.01
         cloud.track[:] *= 1.01
         write_cloud(path, cloud)
-    assert lowalt_command(["remake", str(index), key, "--clouds", str(clouds)]) == 1
-    assert f"sample {key}: its" in capsys.readouterr().out
-    assert lowalt_command(["remake", str(index), key, "--clouds", str(tmp_path / "none")]) == 2
-    assert "cloud of" in capsys.readouterr().err
+    for words, ends, says in (
+        ([key], 0, "1 samples made again"),
+        (["crow-000000-snrinf"], 2, "not in"),
+        ([key, "--clouds", clouds], 1, f"sample {key}: its"),
+        ([key, "--clouds", tmp_path / "none"], 2, "cloud of"),
+    ):
+        status, said = remade(capsys, index, *words)
+        assert status == ends and says in said
 
 
 def test_samples_to_make_again_are_drawn_and_an_index_must_say_how(index):
@@ -257,64 +157,15 @@ def test_samples_without_end_are_new_and_parts_share_them(dataset):
         Endless(dataset, part=2, parts=2)
 
 
-def test_a_scene_with_effects_is_made_as_its_stage_makes_it(dataset, tmp_path):
-    from lowalt.scene.__main__ import main as effects
+LAND = {"clutter": {"gamma": 0.5}}
+CANCELLED = LAND | {"canceller": {"kind": "mean"}}
 
-    config = configuration(
-        effects={"ground_reflection": {"permittivity": 5.24, "conductivity_s_m": 0.16}}
-    )
-    config["echo"] = {**config["echo"], "tolerance": 1e-3}
-    scene = Dataset(config, dataset.clouds, groups=["unseen"])
-    place = scene.place(0)
-    cloud = tmp_path / "cloud.npz"
-    write_cloud(cloud, dataset.clouds[place.subtype])
-    from lowalt.motion import write_table
 
-    write_table(tmp_path / "motion.csv", [scene.row(place)])
-    block = {
-        "seed": config["seed"],
-        "network": config["network"],
-        "tolerance": 1e-3,
-        "effects": config["effects"],
-    }
-    stations = list(config["network"]["stations"])
-    out, power = (
-        [str(tmp_path / f"{name}{end}.npy") for name in stations] for end in ("", "-power")
-    )
-    effects(
-        [
-            "--settings",
-            canonical(block),
-            "--motion",
-            str(tmp_path / "motion.csv"),
-            "--clouds",
-            str(cloud),
-            "--station",
-            *stations,
-            "--out",
-            *out,
-            "--power",
-            *power,
-        ]
-    )
-    snrs = canonical({"seed": config["seed"], "stations": stations, "snr_db": [3, math.inf]})
-    assert settings(snrs)
-    noise(
-        [
-            "--settings",
-            snrs,
-            "--motion",
-            str(tmp_path / "motion.csv"),
-            "--echoes",
-            *out,
-            "--powers",
-            *power,
-            "--out",
-            str(tmp_path / "noisy.npy"),
-        ]
-    )
-    expected = np.load(tmp_path / "noisy.npy")[0]
-    assert (scene.signal(0) == expected[0]).all() and (scene.signal(1) == expected[1]).all()
+@pytest.mark.parametrize(("kind", "effects"), [("signal", CANCELLED), ("recipe", LAND)])
+def test_a_scene_with_effects_is_made_as_its_stages_make_it(kind, effects, dataset, tmp_path):
+    changes = {"targets": {"select": ["Walking Pedestrian 5"]}, "echo": {"tolerance": 1e-3}}
+    scene = Dataset(merge(configuration(effects=effects), changes), dataset.clouds)
+    check_members(scene, ShardSet(run_stages(scene, tmp_path, kind)))
 
 
 def test_a_sample_with_noise_in_all_cells_is_the_same_whatever_was_made_before(dataset):
@@ -339,26 +190,21 @@ def test_samples_of_a_scene_that_hides_points_are_made_again_with_its_surfaces(
     write_run(scene, tmp_path, "signal")
     index = str(tmp_path / "shards/index.json")
     key = scene.key(0)
-    assert (
-        lowalt_command(["remake", index, key]) == 2 and "has no surfaces" in capsys.readouterr().err
-    )
+    status, said = remade(capsys, index, key)
+    assert status == 2 and "has no surfaces" in said
     occluders.write(tmp_path / "occluders/dji-mini-2.npz", surfaces, "DJI Mini 2")
     (tmp_path / "config.yaml").write_text(json.dumps({"run": "hidden"}))
     card.write(index, tmp_path / "config.yaml")
-    assert (
-        lowalt_command(["remake", index, key])
-        == lowalt_command(["verify", index, "--remake", "1"])
-        == 0
-    )
-    (tmp_path / "occluders").rename(tmp_path / "elsewhere")
-    assert lowalt_command(["remake", index, key]) == 2
-    capsys.readouterr()
-    assert lowalt_command(["remake", index, key, "--occluders", str(tmp_path / "elsewhere")]) == 0
-    assert "1 samples made again, equal in every byte" in capsys.readouterr().out
+    assert remade(capsys, index, key)[0] == 0
+    assert lowalt_command(["verify", index, "--remake", "1"]) == 0
+    elsewhere = (tmp_path / "occluders").rename(tmp_path / "elsewhere")
+    assert remade(capsys, index, key)[0] == 2
+    status, said = remade(capsys, index, key, "--occluders", elsewhere)
+    assert status == 0 and "1 samples made again, equal in every byte" in said
     moved = surfaces | {"vertices": surfaces["vertices"] + 1.0}
-    occluders.write(tmp_path / "elsewhere/dji-mini-2.npz", moved, "DJI Mini 2")
-    assert lowalt_command(["remake", index, key, "--occluders", str(tmp_path / "elsewhere")]) == 1
-    assert f"sample {key}: its signal comes out otherwise" in capsys.readouterr().out
+    occluders.write(elsewhere / "dji-mini-2.npz", moved, "DJI Mini 2")
+    status, said = remade(capsys, index, key, "--occluders", elsewhere)
+    assert status == 1 and f"sample {key}: its signal comes out otherwise" in said
 
 
 def test_a_cloud_is_made_once_and_when_a_sample_of_its_target_is_asked_for(monkeypatch):

@@ -15,6 +15,7 @@ from lowalt.files.errors import InputError
 from lowalt.motion.drawing import masts_in_reach
 from lowalt.shards.dataset import Dataset
 from lowalt.shards.plan import Plan
+from tables import rows
 
 PUBLISHED = {
     name: {"unseen_protocol": group}
@@ -93,12 +94,7 @@ def test_a_step_moves_no_chunk_that_was_there(config):
 
 @pytest.mark.parametrize(
     ("steps", "words"),
-    [
-        ([{"snr_db": [8]}], "every SNR once"),
-        ([{"subtypes": ["a"]}], "either selected or added"),
-        ([{"subtypes": ["d"]}, {"subtypes": ["d"]}], "each once"),
-        ([{"subtypes": ["x"]}], "expected names of the table"),
-    ],
+    rows("plans", "steps"),
 )
 def test_what_is_there_already_is_not_added(config, steps, words):
     with pytest.raises(InputError, match=words):

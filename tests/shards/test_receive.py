@@ -15,6 +15,7 @@ from lowalt.files.errors import InputError
 from lowalt.shards import kept_datasets
 from lowalt.shards import receive as module
 from lowalt.spectra.cube import TRUTH
+from options import words
 
 CAR = "AITO M9 2024"
 DRONE = "DJI Mini 2"
@@ -199,19 +200,8 @@ def test_ranges_that_fold_are_named_with_a_value_at_which_none_does():
 def test_the_command_writes_every_array_by_name(tmp_path, capsys):
     small = tmp_path / "small.yaml"
     small.write_text("network: {symbols: 64, subcarriers: 64}\n")
-    line = [
-        "sample",
-        CAR,
-        "2",
-        "--raw",
-        "receiver",
-        "--station",
-        "C",
-        "--overlay",
-        str(small),
-        "--out",
-        str(tmp_path),
-    ]
+    given = {"raw": "receiver", "station": "C", "overlay": small, "out": tmp_path}
+    line = words("sample", CAR, "2", **given)
     assert main(line) == 0
     files = [tmp_path / f"aito-m9-2024-000002-snrinf-C-receiver.{kind}" for kind in ("npz", "h5")]
     assert capsys.readouterr().out.split() == list(map(str, files))
@@ -311,18 +301,20 @@ def test_no_layers_at_all_are_the_embedded_default():
     assert network == Network.from_settings(overlaid([])["network"])
 
 
-def test_wrong_words_are_refused(plain):
-    with pytest.raises(
-        InputError, match=r"at is 'range', expected one of \['subcarriers', 'receiver'"
-    ):
-        lowalt.receive(plain, CAR, at="range")
-    with pytest.raises(InputError, match="model is -1, expected a whole number from 0"):
-        lowalt.receive(plain, CAR, -1)
-    with pytest.raises(InputError, match="subtype is 'Crow', expected one of"):
-        lowalt.receive(plain, "Crow")
-    with pytest.raises(
-        InputError, match=r"station 'D': not in the network, which has \['A', 'B', 'C'\]"
-    ):
-        lowalt.receive(plain, CAR, station="D")
+@pytest.mark.parametrize(
+    ("subtype", "model", "given", "said"),
+    [
+        (CAR, 0, {"at": "range"}, r"at is 'range', expected one of \['subcarriers', 'receiver'"),
+        (CAR, -1, {}, "model is -1, expected a whole number from 0"),
+        ("Crow", 0, {}, "subtype is 'Crow', expected one of"),
+        (CAR, 0, {"station": "D"}, r"station 'D': not in the network, which has \['A', 'B', 'C'\]"),
+    ],
+)
+def test_wrong_words_are_refused(plain, subtype, model, given, said):
+    with pytest.raises(InputError, match=said):
+        lowalt.receive(plain, subtype, model, **given)
+
+
+def test_a_subtype_of_the_default_that_is_misspelt_is_refused_with_the_right_name():
     with pytest.raises(InputError, match=r"expected perhaps \['Crow'\]"):
         lowalt.receive({}, "Krow")

@@ -8,6 +8,7 @@ import pytest
 
 from lowalt.files.errors import InputError
 from lowalt.shards.record_types import column, joined_all, type_of
+from tables import rows
 
 
 def written(*values):
@@ -22,20 +23,7 @@ def written(*values):
 
 @pytest.mark.parametrize(
     "values, expected",
-    [
-        ([1, 2], {"dtype": "int64"}),
-        ([1, 2.5, 3], {"dtype": "float64"}),
-        ([None, True], {"dtype": "bool"}),
-        ([None, None], {"dtype": "float64"}),
-        ([[], ["wall"]], {"list": "string"}),
-        ([[], [1], [2.5]], {"list": "float64"}),
-        ([[], [[]], [["wall", "ground"]]], {"list": {"list": "string"}}),
-        ([[1, 2.5, None]], {"list": "float64"}),
-        ([[]], {"list": "string"}),
-        ([{"a": 1}, {"a": None}], {"struct": [{"name": "a", "dtype": "int64"}]}),
-        ([[], [{"a": [1.0]}]], {"list": [{"name": "a", "list": "float64"}]}),
-        ([[[]], [[{"a": 1}]]], {"list": {"list": [{"name": "a", "dtype": "int64"}]}}),
-    ],
+    rows("record_types", "types"),
 )
 def test_a_field_has_the_narrowest_type_that_holds_all_records(values, expected):
     assert written(*values) == expected
@@ -43,14 +31,7 @@ def test_a_field_has_the_narrowest_type_that_holds_all_records(values, expected)
 
 @pytest.mark.parametrize(
     "values, words",
-    [
-        ([1, "a"], "int64 and string"),
-        ([True, 1], "bool and int64"),
-        ([{"a": 1}, 2], "int64 and mapping"),
-        ([[1], 1], "int64 and list"),
-        ([[1, "a"]], "int64 and string"),
-        ([[1], ["a"]], "int64 and string"),
-    ],
+    rows("record_types", "unlike"),
 )
 def test_unlike_types_are_refused_in_one_sentence_that_names_the_field(values, words):
     with pytest.raises(InputError, match=f"^record.x: {words} in records of one data set"):

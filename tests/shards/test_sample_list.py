@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from lowalt.config.layers import SCHEMA, load, merge
-from lowalt.files.errors import InputError
 from lowalt.shards.dataset import Dataset
 from lowalt.shards.plan import Plan
 from lowalt.shards.sample_list import SampleList
@@ -42,7 +41,3 @@ def test_a_list_has_the_samples_of_its_plan_and_no_other():
         len(keys) // 2
     )
     assert np.array_equal(listed.labels, listed.columns()["label"])
-    with pytest.raises(IndexError, match=f"expected 0 to {len(keys) - 1}"):
-        listed[len(keys)]
-    with pytest.raises(InputError, match="folds"):
-        SampleList(plan, published, folds=["validation"])

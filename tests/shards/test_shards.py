@@ -21,6 +21,7 @@ from lowalt.shards.sample_table import map_samples, table_path
 from lowalt.shards.sizes import sample_bytes
 from lowalt.shards.write import ChunkSamples, write_shard
 from lowalt.tiles import decode, resize, split
+from options import words
 from pictures import NETWORK, echoes
 
 
@@ -44,14 +45,6 @@ def test_tar_bytes_are_those_of_webdatasets_writer(images):
         )
     writer.close()
     assert path.read_bytes() == buffer.getvalue()
-
-
-@pytest.mark.parametrize("kind", ["image", "signal"])
-def test_equal_inputs_give_equal_bytes(images, signals, kind, tmp_path):
-    old = {"image": images, "signal": signals}[kind]
-    new = build(tmp_path, kind)
-    for path in sorted(old.iterdir()):
-        assert (new / path.name).read_bytes() == path.read_bytes(), path.name
 
 
 def test_every_sample_stands_once_in_the_fold_that_is_its_own(images):
@@ -82,24 +75,9 @@ def test_order_depends_on_names_alone(images, tmp_path):
     np.save(tmp_path / "seen.npy", noisy)
     write_table(tmp_path / "seen.csv", rows[::-1])
     block = {**json.loads(write_settings("signal")), "snr_db": ["inf", 8, 3]}
-    inputs = [
-        "--motion",
-        f"{tmp_path}/seen.csv",
-        "--signals",
-        f"{tmp_path}/seen.npy",
-        "--fold",
-        "train",
-    ]
-    main(
-        [
-            "write",
-            "--settings",
-            json.dumps(block),
-            *inputs,
-            "--out",
-            f"{tmp_path}/seen-train-00000.tar",
-        ]
-    )
+    files = {"motion": tmp_path / "seen.csv", "signals": tmp_path / "seen.npy"}
+    out = tmp_path / "seen-train-00000.tar"
+    main(words("write", settings=json.dumps(block), **files, fold="train", out=out))
     before = map_samples(images / "seen-train-00000.npz")["key"].tolist()
     after = map_samples(tmp_path / "seen-train-00000.npz")["key"].tolist()
     assert [key for key in after if not key.endswith(b"snr008")] == before
@@ -137,27 +115,23 @@ def test_both_kinds_give_the_same_images(images, signals):
 
 
 def test_wrong_input_is_refused_by_name(images, tmp_path, tmp_path_factory):
-    inputs = ["--motion", f"{images}/seen.csv", "--signals", f"{images}/seen.npy"]
-    out = ["--fold", "train", "--out", f"{tmp_path}/x.tar"]
-    tiles = ["--tiles", f"{images}/seen.tiles.npz"]
+    right = {"motion": images / "seen.csv", "signals": images / "seen.npy"}
+    right |= {"tiles": images / "seen.tiles.npz", "fold": "train", "out": tmp_path / "x.tar"}
     block = json.loads(write_settings("image"))
     one = tmp_path_factory.mktemp("one") / "seen.npy"
     np.save(one, np.load(images / "seen.npy")[:, :1])
     for change, given, named in [
-        ({}, [*inputs, *out], "--tiles"),
-        ({"shards": {"kind": "sound"}}, [*inputs, *tiles, *out], "sound"),
-        ({"snr_db": [3]}, [*inputs, *tiles, *out], "seen.npy"),
-        ({}, [*inputs, "--tiles", f"{images}/unseen.tiles.npz", *out], "unseen.tiles.npz"),
-        ({}, [*inputs, *tiles, "--fold", "trial", "--out", f"{tmp_path}/x.tar"], "trial"),
+        ({}, {"tiles": None}, "--tiles"),
+        ({"shards": {"kind": "sound"}}, {}, "sound"),
+        ({"snr_db": [3]}, {}, "seen.npy"),
+        ({}, {"tiles": images / "unseen.tiles.npz"}, "unseen.tiles.npz"),
+        ({}, {"fold": "trial"}, "trial"),
         # The images of two SNRs for one.
-        (
-            {"snr_db": [3]},
-            [*inputs[:2], "--signals", str(one), *tiles, *out],
-            "16 images, expected 8",
-        ),
+        ({"snr_db": [3]}, {"signals": one}, "16 images, expected 8"),
     ]:
+        options = words(settings=json.dumps({**block, **change}), **right | given)
         with pytest.raises(InputError, match=named):
-            main(["write", "--settings", json.dumps({**block, **change}), *given])
+            main(["write", *options])
     assert list(tmp_path.iterdir()) == []
     with pytest.raises(InputError, match="tests"):
         ShardSet(images / "index.json", ["seen"], ["tests"])

@@ -14,23 +14,25 @@ from lowalt.files.errors import InputError
 from lowalt.shards import manifest
 from lowalt.shards.build import main, write_run
 from lowalt.shards.dataset import Dataset
+from options import words
 
 
 def test_a_configuration_and_clouds_are_a_whole_data_set(dataset, tmp_path, monkeypatch, capsys):  # noqa: F811
     run = tmp_path / "run"
     write_run(dataset, run, "image")
-    manifest.main(["write", "--run", str(run), "--manifest", str(tmp_path / "run.sha256")])
+    manifest.main(words("write", run=run, manifest=tmp_path / "run.sha256"))
     (run / "config.yaml").write_text(yaml.safe_dump(plain(configuration())))
     # The records lie elsewhere for who gets the two.
     monkeypatch.chdir(tmp_path)
-    main(["--config", "run/config.yaml", "--clouds", "run/clouds", "--out", "again"])
-    manifest.main(["check", "--run", "again", "--manifest", "run.sha256"])
+    whole = {"config": "run/config.yaml", "clouds": "run/clouds"}
+    main(words(**whole, out="again"))
+    manifest.main(words("check", run="again", manifest="run.sha256"))
     assert "are equal to run.sha256" in capsys.readouterr().out
     assert len(list((tmp_path / "again/shards").iterdir())) == 13
     (run / "config.yaml").write_text(yaml.safe_dump(plain(configuration(seed=5))))
-    main(["--config", "run/config.yaml", "--clouds", "run/clouds", "--out", "other"])
+    main(words(**whole, out="other"))
     with pytest.raises(SystemExit):
-        manifest.main(["check", "--run", "other", "--manifest", "run.sha256"])
+        manifest.main(words("check", run="other", manifest="run.sha256"))
     assert capsys.readouterr().out.startswith("motion: motion/seen-00000.csv differs")
 
 

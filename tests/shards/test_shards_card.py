@@ -21,14 +21,22 @@ from lowalt.shards.card import main, readme
 from lowalt.shards.croissant import metadata
 from lowalt.shards.index import build as index_of
 from lowalt.shards.write import ChunkSamples, write_shard
+from options import words
+from tables import rows
+
+
+def make_card(folder, **options):
+    """The card of the data set in a folder, with the configuration beside it and of a fixed day."""
+    given = {"index": folder / "index.json", "config": folder / "config.yaml"}
+    given |= {"date": "2026-01-31", "url": "https://example.org/trial"}
+    main(words(**given | options))
 
 
 @pytest.fixture(scope="module", params=["image", "signal"])
 def published(request, tmp_path_factory):
     folder = build(tmp_path_factory.mktemp(request.param), request.param)
     (folder / "config.yaml").write_text(yaml.safe_dump(CONFIG))
-    arguments = ["--index", str(folder / "index.json"), "--config", str(folder / "config.yaml")]
-    main([*arguments, "--date", "2026-01-31", "--url", "https://example.org/trial"])
+    make_card(folder)
     return folder
 
 
@@ -54,19 +62,14 @@ def test_card_has_counts_configuration_and_versions(published):
 
 @pytest.mark.parametrize(
     ("run", "name", "version"),
-    [
-        ("trial", "lowalt-trial", "0.2.0"),
-        ("lowalt-40-v1", "lowalt-40-v1", "1.0.0"),
-        ("lowalt-40-v12", "lowalt-40-v12", "12.0.0"),
-        ("trial-v2", "lowalt-trial-v2", "0.2.0"),
-    ],
+    rows("cards", "versions"),
 )
 def test_only_a_frozen_run_gives_its_data_set_a_version_and_a_card_with_rules(
     published, tmp_path, run, name, version
 ):
     folder = shutil.copytree(published, tmp_path / "shards")
     (tmp_path / "config.yaml").write_text(yaml.safe_dump(CONFIG | {"run": run}))
-    main(["--index", str(folder / "index.json"), "--config", str(tmp_path / "config.yaml")])
+    make_card(folder, config=tmp_path / "config.yaml")
     described = json.loads((folder / "croissant.json").read_text())
     assert (described["name"], described["version"]) == (name, version)
     card_text = (folder / "README.md").read_text()
@@ -142,16 +145,7 @@ def test_a_card_names_the_spectra_and_sizes_that_its_tiles_have(tmp_path):
 
 def test_the_licence_asked_for_stands_in_every_file_and_another_is_refused(published, tmp_path):
     copy = shutil.copytree(published, tmp_path / "copy")
-    main(
-        [
-            "--index",
-            str(copy / "index.json"),
-            "--config",
-            str(copy / "config.yaml"),
-            "--license",
-            "CC-BY-4.0",
-        ]
-    )
+    make_card(copy, license="CC-BY-4.0")
     assert (
         "CC-BY-4.0 (https://creativecommons.org/licenses/by/4.0/)"
         in (copy / "README.md").read_text()
@@ -176,8 +170,7 @@ def test_equal_data_sets_have_equal_cards(published, tmp_path):
     before = {
         name: (copy / name).read_bytes() for name in ("README.md", "samples.csv", "croissant.json")
     }
-    arguments = ["--index", str(copy / "index.json"), "--config", str(copy / "config.yaml")]
-    main([*arguments, "--date", "2026-01-31", "--url", "https://example.org/trial"])
+    make_card(copy)
     assert before == {name: (copy / name).read_bytes() for name in before}
     with pytest.raises(InputError, match="nowhere"):
-        main([*arguments[:2], "--config", str(tmp_path / "nowhere.yaml")])
+        make_card(copy, config=tmp_path / "nowhere.yaml")

@@ -11,22 +11,26 @@ import numpy as np
 import pytest
 import yaml
 
-from dataset import CONFIG, SEED, SNRS, build
+from dataset import CONFIG, SEED, build, motion_rows, write_settings
 from hub_library import loaded
 from lowalt.config.network import Network
 from lowalt.files.errors import InputError
-from lowalt.noise.awgn import noisy_signals
 from lowalt.numerics.streams import stream
 from lowalt.scene.effects.transmitter import slow_time
 from lowalt.shards import ShardSet, clean
 from lowalt.shards.__main__ import main
+from lowalt.shards.build import write_run
 from lowalt.shards.card import main as card
+from lowalt.shards.dataset import Dataset
 from lowalt.shards.index import build as build_index
 from lowalt.shards.sample_record import npy, row_of
 from lowalt.shards.sample_table import map_samples
 from lowalt.shards.verify import faults
 from lowalt.shards.write import ChunkSamples, write_shard
+from options import words
 from pictures import NETWORK
+from small_configuration import configuration
+from stage_runs import check_members
 
 STATIONS = list(NETWORK["stations"])
 
@@ -41,71 +45,22 @@ def recipes(tmp_path_factory):
 @pytest.fixture(scope="module")
 def published(recipes, tmp_path_factory):
     folder = build(tmp_path_factory.mktemp("published") / "shards", "recipe", inputs=False)
-    arguments = [
-        "--index",
-        str(folder / "index.json"),
-        "--config",
-        str(recipes.parent / "config.yaml"),
-    ]
-    card([*arguments, "--date", "2026-01-31", "--url", "https://example.org/trial"])
-    return folder
-
-
-@pytest.fixture(scope="module")
-def noised(recipes):
-    """The same samples as a data set of signal shards, noise added by the noise stage."""
-    from lowalt.motion import read_table
-
-    folder = recipes.parent / "noised"
-    folder.mkdir()
-    shards = []
-    for group in ("seen", "unseen"):
-        rows = read_table(recipes / f"{group}.csv")
-        echoes = np.stack([np.load(recipes / f"{group}.{name}.npy") for name in STATIONS])
-        np.save(folder / f"{group}.npy", noisy_signals(echoes, rows, STATIONS, [3.0, np.inf], SEED))
-        for fold in ("train", "val", "test"):
-            shards.append(str(folder / f"{group}-{fold}-00000.tar"))
-            settings = json.dumps(
-                {
-                    **{k: CONFIG[k] for k in ("seed", "network", "split")},
-                    "snr_db": SNRS,
-                    "shards": {"kind": "signal"},
-                }
-            )
-            main(
-                [
-                    "write",
-                    "--settings",
-                    settings,
-                    "--motion",
-                    str(recipes / f"{group}.csv"),
-                    "--signals",
-                    str(folder / f"{group}.npy"),
-                    "--fold",
-                    fold,
-                    "--out",
-                    shards[-1],
-                ]
-            )
-    render = json.dumps({name: CONFIG[name] for name in ("network", "spectra", "images")})
-    main(["index", "--settings", render, "--shards", *shards, "--out", str(folder / "index.json")])
-    return folder
-
-
-def test_every_sample_is_the_one_of_the_signal_shards_under_the_same_number(recipes, noised):
-    found = ShardSet(recipes / "index.json")
-    expected = ShardSet(noised / "index.json")
-    assert (
-        (found.keys == expected.keys).all()
-        and (found.snrs_db == expected.snrs_db).all()
-        and len(found) == 24
+    card(
+        words(
+            index=folder / "index.json",
+            config=recipes.parent / "config.yaml",
+            date="2026-01-31",
+            url="https://example.org/trial",
+        )
     )
-    for number in range(len(found)):
-        assert found.members(number) == expected.members(number)
-        assert found.record(number) == expected.record(number)
-        assert (found.signal(number) == expected.signal(number)).all()
-    assert (found.tile(5) == expected.tile(5)).all()
-    assert (found.images(7, 64, ["B"]) == expected.images(7, 64, ["B"])).all()
+    return folder
+
+
+def test_samples_have_the_numbers_that_they_have_in_signal_shards_and_no_image(recipes, tmp_path):
+    found = ShardSet(recipes / "index.json")
+    expected = ShardSet(build(tmp_path / "signal", "signal") / "index.json")
+    np.testing.assert_array_equal(found.keys, expected.keys)
+    np.testing.assert_array_equal(found.snrs_db, expected.snrs_db)
     with pytest.raises(InputError, match="kind 'recipe', expected 'image'"):
         found.png(0)
 
@@ -135,7 +90,7 @@ def test_images_know_how_late_symbols_are_as_the_effect_draws_it(recipes, tmp_pa
     assert (shards.tile(5) != shards.renderer.tile(shards.signal(5))).any()
 
 
-def test_each_motion_model_is_stored_once(recipes, noised):
+def test_each_motion_model_is_stored_once(recipes):
     with tarfile.open(recipes / "seen-train-00000.tar") as archive:
         names = archive.getnames()
     rows = map_samples(recipes / "seen-train-00000.npz")
@@ -143,20 +98,11 @@ def test_each_motion_model_is_stored_once(recipes, noised):
     assert sorted(names) == sorted(
         f"{model}{end}" for model in models for end in (".clean.npy", ".json")
     )
-    # A quarter of a signal shard's bytes would be four SNRs; two SNRs share each echo here.
-    sizes = [ShardSet(folder / "index.json").index["shards"] for folder in (recipes, noised)]
-    whole = [
-        sum(rows["size"].astype(float))
-        for rows in (rows, map_samples(noised / "seen-train-00000.npz"))
-    ]
-    stored = sum({int(row["offset"]): int(row["size"]) for row in rows}.values())
-    assert whole[0] == 2 * stored and stored == pytest.approx(whole[1] / 2, rel=0.02)
-    assert sum(entry["samples"] for entry in sizes[0]) == 24
+    # Two SNRs share each echo.
+    assert len(set(rows["offset"].tolist())) == len(models) == len(rows) / 2
 
 
 def test_splits_by_sample_give_each_fold_its_own_levels(tmp_path):
-    from dataset import motion_rows
-
     rows = motion_rows("unseen")
     split = {"by": "sample", "train": 2, "val": 1, "test": 1}
     echoes = np.ones((3, 400), np.complex64)
@@ -174,67 +120,17 @@ def test_splits_by_sample_give_each_fold_its_own_levels(tmp_path):
     assert sorted(seen) == [(model, snr) for model in range(4) for snr in (3.0, 8.0, np.inf)]
 
 
-def test_powers_of_a_scene_with_effects_set_the_noise(tmp_path):
-    from dataset import motion_rows
-
-    rows = [row | {"fold": "train"} for row in motion_rows("unseen", 1)]
-    echoes = np.full((3, 1, 400), 1 + 1j, np.complex64)
-    powers = np.array([[1e-3], [2.0], [0.0]])
-    split = {"by": "motion", "train": 1, "val": 1, "test": 1}
-    network = Network.from_settings(NETWORK)
-    write_shard(
-        tmp_path / "unseen-train-00000.tar",
-        ChunkSamples(rows, [3.0], split, 3, network, powers=powers),
-        "train",
-        "recipe",
-        lambda *_: (npy(echoes[:, 0]), {}),
-    )
-    with tarfile.open(tmp_path / "unseen-train-00000.tar") as archive:
-        name = next(name for name in archive.getnames() if name.endswith(".json"))
-        entry = json.load(archive.extractfile(name))
-    expected = noisy_signals(echoes, rows, STATIONS, [3.0], 3, powers)[0, 0]
-    found = clean.noisy(entry, echoes[:, 0], STATIONS, 3.0)
-    assert (
-        (found == expected).all()
-        and (found[2] == 1 + 1j).all()
-        and found[1].std() > found[0].std() > 0
-    )
-    assert clean.POWER not in json.loads(clean.unpacked(entry, 3.0))
-    with pytest.raises(InputError, match="expected 8"):
-        clean.unpacked(entry, 8.0)
-
-
-def test_a_scene_with_a_canceller_gives_the_samples_of_its_signal_shards(tmp_path):
-    from test_dataset import configuration
-
-    from lowalt.shards.build import write_run
-    from lowalt.shards.dataset import Dataset
-
-    effects = {
-        "ground_reflection": {"permittivity": 5.24, "conductivity_s_m": 0.16},
-        "canceller": {"kind": "mean"},
-    }
-    config = configuration(effects=effects)
-    config["echo"] = {**config["echo"], "tolerance": 1e-3}
-    config["targets"] = {**config["targets"], "select": ["Owl"]}
-    config["motion"] = {**config["motion"], "models": 4}
+def test_noise_passes_the_canceller_of_a_scene_and_noise_that_effects_add_is_refused(tmp_path):
+    config = configuration(effects={"canceller": {"kind": "mean"}})
+    config["targets"]["select"] = ["Owl"]
     scene = Dataset(config)
-    for kind in ("signal", "recipe"):
-        write_run(scene, tmp_path / kind, kind)
-    stored, packed = (
-        ShardSet(tmp_path / kind / "shards" / "index.json") for kind in ("signal", "recipe")
-    )
-    assert len(stored) == 8 and [stored.members(n) for n in range(8)] == [
-        packed.members(n) for n in range(8)
-    ]
+    write_run(scene, tmp_path, "recipe")
+    check_members(scene, ShardSet(tmp_path / "shards/index.json"))
     with pytest.raises(InputError, match="cell_noise"):
         clean.refuse({"cell_noise": {}})
-    clean.refuse(effects)
 
 
 def test_damage_is_named_with_every_sample_that_it_reaches(published, tmp_path):
-    import shutil
-
     folder = shutil.copytree(published, tmp_path / "copy")
     assert list(faults(folder / "index.json")) == []
     rows = map_samples(folder / "seen-train-00000.npz")
@@ -259,9 +155,9 @@ def test_damage_is_named_with_every_sample_that_it_reaches(published, tmp_path):
         shards.signal(len(shards) - 1)
 
 
-def test_webdataset_gives_the_samples_of_signal_shards(published, noised):
+def test_webdataset_gives_the_samples_that_are_read_by_number(published):
     webdataset = pytest.importorskip("webdataset")
-    stored = ShardSet(noised / "index.json", ["seen"], ["train"])
+    stored = ShardSet(published / "index.json", ["seen"], ["train"])
     numbers = {key.decode(): number for number, key in enumerate(stored.keys.tolist())}
     path = str(published / "seen-train-00000.tar")
     for decoding in (False, True):
@@ -296,32 +192,19 @@ def test_card_and_croissant_tell_of_recipes(published, mlcroissant):
 
 
 def test_a_missing_file_of_echoes_is_named(recipes, tmp_path):
-    settings = json.dumps(
-        {
-            **{k: CONFIG[k] for k in ("seed", "network", "split")},
-            "snr_db": SNRS,
-            "shards": {"kind": "recipe"},
-        }
-    )
-    arguments = [
-        "write",
-        "--settings",
-        settings,
-        "--motion",
-        str(recipes / "seen.csv"),
-        "--fold",
-        "train",
-        "--out",
-        str(tmp_path / "seen-train-00000.tar"),
-    ]
-    paths = [str(recipes / f"seen.{name}.npy") for name in STATIONS]
-    other = str(recipes / "unseen.A.npy")
+    settings = write_settings("recipe")
+    out = tmp_path / "seen-train-00000.tar"
+    paths = [recipes / f"seen.{name}.npy" for name in STATIONS]
+    other = recipes / "unseen.A.npy"
     for given, message in (
-        ([], "--echoes: missing"),
-        (["--echoes", *paths[:2]], "2 files"),
-        (["--echoes", *paths[:2], other], "unseen"),
-        (["--echoes", *paths, "--powers", *paths], "--powers: shape"),
+        ({}, "--echoes: missing"),
+        ({"echoes": paths[:2]}, "2 files"),
+        ({"echoes": [*paths[:2], other]}, "unseen"),
+        ({"echoes": paths, "powers": paths}, "--powers: shape"),
     ):
+        options = words(
+            settings=settings, motion=recipes / "seen.csv", fold="train", out=out, **given
+        )
         with pytest.raises(InputError, match=message):
-            main([*arguments, *given])
+            main(["write", *options])
     assert not list(tmp_path.iterdir())

@@ -28,6 +28,13 @@ def options(tmp_path):
     return given
 
 
+def refused(capsys, *words: str) -> list[str]:
+    """What a check says that ends with status 1."""
+    with pytest.raises(SystemExit, match="1"):
+        manifest.main(["check", *words])
+    return capsys.readouterr().out.splitlines()
+
+
 @pytest.mark.parametrize(
     ("line", "words"),
     [
@@ -60,14 +67,11 @@ def test_stages_that_left_no_files_are_passed_over_where_they_are_named_alone(
         (["echo"], [f"noise: {FILES[3]} is missing"]),
         ([], [f"echo: {FILES[2]} is missing", f"noise: {FILES[3]} is missing"]),
     ):
-        with pytest.raises(SystemExit, match="1"):
-            manifest.main(["check", *options, "--without", *without])
-        assert capsys.readouterr().out.splitlines() == missing
+        assert refused(capsys, *options, "--without", *without) == missing
     # A file that is there is compared all the same.
     (tmp_path / "run" / FILES[3]).write_text("other")
-    with pytest.raises(SystemExit, match="1"):
-        manifest.main(["check", *options, "--without", "echo", "noise"])
-    assert capsys.readouterr().out.splitlines() == [f"noise: {FILES[3]} differs"]
+    told = refused(capsys, *options, "--without", "echo", "noise")
+    assert told == [f"noise: {FILES[3]} differs"]
 
 
 def test_faults_are_told_in_the_order_of_the_stages_and_the_first_stage_by_its_name(
@@ -120,9 +124,7 @@ def test_a_manifest_by_groups_has_the_checksums_of_sha256sum_and_notices_each_ch
     (run / "motion/seen-00001.csv").unlink()
     (run / "noisy/unseen-00000.npy").write_text("more")
     (run / "shards/seen-train-00001.tar").write_text("other")
-    with pytest.raises(SystemExit):
-        manifest.main(["check", *options])
-    assert capsys.readouterr().out.splitlines() == [
+    assert refused(capsys, *options) == [
         "motion: motion/seen-*.csv differs",
         "noise: noisy/unseen-00000.npy is not in the manifest",
         "shards: shards/seen-train-*.tar differs",

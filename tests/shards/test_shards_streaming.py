@@ -69,20 +69,3 @@ def test_the_hubs_library_gives_each_sample_once_over_nodes_and_workers(folder, 
         part = split_dataset_by_node(whole.shuffle(seed=1, buffer_size=1000), rank, NODES)
         found.append(loaded(part.select_columns("__key__"), collate_fn=lambda row: row["__key__"]))
     assert all(found) and sorted(chain(*found)) == keys_of(folder)
-
-
-def test_random_access_gives_each_sample_once_over_nodes_and_workers(folder):
-    shards = ShardSet(folder / "index.json")
-
-    class Keys(torch.utils.data.Dataset):
-        """The keys in the samples' own records."""
-
-        def __len__(self):
-            return len(shards)
-
-        def __getitem__(self, number):
-            return shards.record(int(number))["key"]
-
-    order = torch.randperm(len(shards), generator=torch.Generator().manual_seed(1)).tolist()
-    found = [loaded(Keys(), sampler=order[rank::NODES]) for rank in range(NODES)]
-    assert all(found) and sorted(chain(*found)) == keys_of(folder)

@@ -22,6 +22,8 @@ from lowalt.spectra import (
     zero_index,
 )
 from lowalt.spectra.sliding import fourier_magnitudes, transfer, turns
+from pictures import SPECTRA
+from tables import rows
 
 INTERVAL = 2.5e-3
 CARRIER = 4.93192e9
@@ -159,19 +161,6 @@ def test_a_signal_that_is_not_finite_is_refused(value):
         trp(np.complex128(1))
 
 
-BLOCK = {
-    "vrp": {"window": 256, "hop": 1, "points": 256},
-    "trp": {"window": 8, "hop": 1, "points": 1024},
-    "vt": {
-        "window": 8,
-        "hop": 1,
-        "speed_min_mps": -6.1,
-        "speed_max_mps": 6.1,
-        "speed_step_mps": 0.1,
-    },
-}
-
-
 def test_spectra_stand_in_the_catalogue_s_order_with_their_settings():
     assert [zero_index(name) for name in NAMES] == [0, 0, 128, *[0] * (len(NAMES) - 3)]
     short = Fourier(8, 3, 16)
@@ -186,24 +175,14 @@ def test_spectra_stand_in_the_catalogue_s_order_with_their_settings():
 
 
 def test_settings_default_to_the_published_ones():
-    assert Spectra.from_settings(BLOCK) == Spectra()
+    assert Spectra.from_settings(SPECTRA) == Spectra()
     np.testing.assert_allclose(Spectra()["vt"].speeds_mps, np.arange(-61, 62) / 10, atol=1e-12)
 
 
 @pytest.mark.parametrize(
     ("part", "change", "named"),
-    [
-        ("vrp", {"window": 255}, "255"),
-        ("vrp", {"points": 128}, "128"),
-        ("trp", {"window": 1}, "window is 1"),
-        ("trp", {"hop": True}, "hop is True"),
-        ("vt", {"window": 0}, "window is 0"),
-        ("vt", {"speed_step_mps": True}, "step_mps is True"),
-        ("trp", {"overlap": 3}, "overlap"),
-        ("vt", {"speed_min_mps": 7.0}, "min < max"),
-        ("vt", {"speed_max_mps": float("inf")}, "speed_max_mps"),
-    ],
+    rows("spectra", "settings"),
 )
 def test_wrong_settings_are_refused_by_name(part, change, named):
     with pytest.raises(InputError, match=named):
-        Spectra.from_settings({**BLOCK, part: {**BLOCK[part], **change}})
+        Spectra.from_settings({**SPECTRA, part: {**SPECTRA[part], **change}})

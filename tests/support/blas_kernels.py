@@ -16,10 +16,6 @@ this processor has are refused by OpenBLAS itself, which then takes others."""
 SMALLER = "Haswell"
 """The one of them that NumPy, numba and the C library are told to be as well: it has no AVX-512."""
 
-
-SMALLER = "Haswell"
-"""The one of them that NumPy, numba and the C library are told to be as well: it has no AVX-512."""
-
 PROBE = """
 import sys
 import numpy as np

@@ -14,6 +14,7 @@ from lowalt.shards.__main__ import main
 from lowalt.shards.sample_record import npy
 from lowalt.shards.write import ChunkSamples, write_shard
 from lowalt.tiles import encode, tile_files
+from options import words
 from pictures import IMAGES, NETWORK, SPECTRA, echoes, renderer
 
 RENDER = {"network": NETWORK, "spectra": SPECTRA, "images": IMAGES}
@@ -92,30 +93,11 @@ def build(folder, kind, inputs=True):
         tile_files.write(folder / f"{group}.tiles.npz", pngs)
         for name in ("train", "val", "test"):
             shards.append(str(folder / f"{group}-{name}-00000.tar"))
-            given = ["--motion", f"{folder}/{group}.csv", *write_options(folder, group, kind)]
-            main(
-                [
-                    "write",
-                    "--settings",
-                    write_settings(kind),
-                    *given,
-                    "--fold",
-                    name,
-                    "--out",
-                    shards[-1],
-                ]
-            )
-    main(
-        [
-            "index",
-            "--settings",
-            json.dumps(RENDER),
-            "--shards",
-            *shards,
-            "--out",
-            str(folder / "index.json"),
-        ]
-    )
+            files = words(motion=folder / f"{group}.csv", fold=name, out=shards[-1])
+            content = write_options(folder, group, kind)
+            main(["write", "--settings", write_settings(kind), *files, *content])
+    options = words(settings=json.dumps(RENDER), shards=shards, out=folder / "index.json")
+    main(["index", *options])
     for path in [] if inputs else [*folder.glob("seen.*"), *folder.glob("unseen.*")]:
         path.unlink()
     return folder

@@ -8,6 +8,14 @@ from lowalt.motion.table import NUMBERS
 from lowalt.targets.cloud import Cloud
 from lowalt.targets.skeleton import node_cloud
 
+SETTINGS = {
+    "region": {"polygon_m": None, "mast_clearance_m": 10.0},
+    "height_m": {"UAV": [30.0, 150.0], "Bird": [20.0, 120.0]},
+    "tilt_deg": 20.0,
+    "cadence": "free",
+}
+"""Settings of the draws of motion models."""
+
 
 def rigid_cloud(kind: str, category: str, extra: dict | None = None) -> Cloud:
     """A body point and one moving part of three points, hinged off the origin about a slanted axis."""

@@ -59,12 +59,6 @@ def resampled_line(values, out):
     return result
 
 
-def resampled(values, size):
-    """The triangle kernel on both axes, rows first."""
-    rows = np.array([resampled_line(row, size) for row in values])
-    return np.array([resampled_line(column, size) for column in rows.T]).T
-
-
 def index_image(values, signed, scale, floor_db=40.0, gamma=1.0):
     """Index values of an image of values whose row 0 is the most negative: turned round, scaled,
     rounded.

@@ -7,8 +7,9 @@ import numpy as np
 from lowalt.config.network import Network, Station
 from lowalt.echo import Rigid
 from lowalt.motion.table import NUMBERS
+from lowalt.scene.chain import SceneSample
 from lowalt.scene.effects import called
-from lowalt.scene.observe import Scene
+from lowalt.scene.observe import Scene, observe
 from lowalt.scene.view import Beams, Perturbations, View, located
 from lowalt.targets.cloud import Cloud
 
@@ -83,6 +84,15 @@ def target(
 def scene(effects: dict, radio: Network | None = None) -> Scene:
     """The scene of these effects."""
     return Scene(radio or network(), 5, None, tuple(called(effects)))
+
+
+def sample_of(
+    effects: dict, radio: Network | None = None, rng: int = 1, points: int = 9, **changes: float
+) -> SceneSample:
+    """The small target as the first station of a scene of these effects sees it."""
+    asked = scene(effects, radio)
+    cloud, row = target(np.random.default_rng(rng), points, **changes)
+    return SceneSample(asked, observe(asked, asked.network.stations[0], cloud, row))
 
 
 def view_of(

@@ -7,14 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from lowalt.files.errors import InputError
 from lowalt.targets import cloud as clouds
 from lowalt.targets import gait, gait_walk
 from lowalt.targets.records import load_table, merge, read_records
-from lowalt.targets.skeleton import FEET, NODES, PARENTS, rotation, stature_m
+from lowalt.targets.skeleton import FEET, NODES, PARENTS, stature_m
+from tables import rows
 
 ROOT = Path(__file__).parents[2]
 TABLE = {
@@ -43,19 +42,7 @@ def test_cycle_length_and_duration_are_the_published_ones():
 
 @pytest.mark.parametrize(
     ("rv", "phase", "degrees"),
-    [
-        (1.0, 0.9, (25, None, None)),
-        (1.0, 0.5, (-15, None, 8)),
-        (1.0, 0.75, (None, 70, None)),
-        (0.25, 0.9, (12.5, None, None)),
-        (0.25, 0.75, (None, 35, None)),
-        (0.25, 0.08, (None, None, -10.5)),
-        (1.0, 0.17, (None, 3, None)),
-        (1.0, 0.85, (None, None, -3)),
-        (3.0, 0.70, (None, 65, None)),
-        (3.0, 0.1, (30, None, None)),
-        (3.0, 0.4, (None, 3, 5)),
-    ],
+    rows("gaits", "points"),
 )
 def test_leg_passes_through_the_published_control_points(rv, phase, degrees):
     for found, wanted in zip(gait_walk.leg(rv, np.array([phase])), degrees, strict=True):
@@ -139,25 +126,9 @@ def test_runner_flies_and_walker_never_does():
         assert bool(lowest.max() > 0.06) is flies
 
 
-@given(st.sampled_from("xyz"), st.floats(-7, 7))
-def test_rotation_is_a_right_handed_rotation(axis, angle):
-    matrix = rotation(axis, np.array(angle))
-    assert np.allclose(matrix @ matrix.T, np.eye(3), atol=1e-15)
-    unit = np.eye(3)["xyz".index(axis)]
-    side = np.roll(unit, 1)
-    assert np.dot(np.cross(side, matrix @ side), unit) == pytest.approx(np.sin(angle), abs=1e-12)
-
-
 @pytest.mark.parametrize(
     ("changes", "names"),
-    [
-        ({"gait": "hop"}, "hop"),
-        ({"speed_mps": "fast"}, "speed_mps"),
-        ({"speed_mps": 5.0}, "relative speed"),
-        ({"stature_m": 176}, "stature_m"),
-        ({"gait": None}, "walk, run"),
-        ({"speed": 1.0}, "unknown key"),
-    ],
+    rows("gaits", "records"),
 )
 def test_bad_records_are_refused_by_name(changes, names):
     with pytest.raises(InputError, match=names) as error:

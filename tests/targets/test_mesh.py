@@ -1,8 +1,6 @@
 """Users' meshes, made and real: places, axes, units and formats, parts that turn, regions."""
 
 import os
-import subprocess
-import sys
 import warnings
 from pathlib import Path
 
@@ -13,7 +11,7 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lowalt.files.errors import InputError, InputWarning
+from lowalt.files.errors import InputWarning
 from lowalt.targets import cloud as clouds
 from lowalt.targets.mesh_files import read_mesh, suffixes
 from lowalt.targets.record_schema import record_files
@@ -21,6 +19,7 @@ from lowalt.targets.records import read_records
 from lowalt.targets.surfaces import volume
 from meshes import ROOT, TABLE, box, car_record, made, plain, quad_record, saved, write_quad
 from real_inputs import FOLDER, needs_inputs
+from snakemake_runs import run
 
 
 def test_places_senses_and_sizes_are_those_of_the_record(quad):
@@ -280,19 +279,9 @@ def test_the_workflow_s_rule_makes_the_cloud_of_meshes_with_odd_names(tmp_path):
     ):
         (copy / name).symlink_to(ROOT / name)
     environment = {**os.environ, "LOWALT_INPUTS": str(inputs), "PYTHONPATH": str(ROOT / "src")}
-    command = [
-        "snakemake",
-        "--cores",
-        "2",
-        "--configfile",
-        str(tmp_path / "overlay.yaml"),
-        "--",
-        "clouds",
-    ]
-    done = subprocess.run(
-        [sys.executable, "-m", *command], cwd=copy, env=environment, capture_output=True, text=True
-    )
-    assert done.returncode == 0 and "from files: DJI Mini 2" in done.stderr, done.stderr[-3000:]
+    line = ["--cores", "2", "--configfile", str(tmp_path / "overlay.yaml"), "--", "clouds"]
+    status, said = run(copy, line, environment)
+    assert status == 0 and "from files: DJI Mini 2" in said, said[-3000:]
     seed = yaml.safe_load((ROOT / "config/default.yaml").read_text())["seed"]
     cloud = clouds.read(copy / "results/odd/clouds/dji-mini-2.npz")
     np.testing.assert_array_equal(cloud.points, made("DJI Mini 2", inputs, seed, **record).points)
@@ -364,12 +353,3 @@ def test_every_real_mesh_is_used_and_alone_becomes_a_valid_cloud():
     for name in files:
         cloud = made("DJI Mini 2", FOLDER, **plain(name, unit=UNITS.get(Path(name).name, "m")))
         assert len(cloud.points) == 171 and np.ptp(cloud.points, axis=0).max() < 5.0
-
-
-@needs_inputs
-def test_inches_given_as_metres_are_caught_by_the_published_size():
-    record = REAL["BYD Song L EV 2024"] | {"unit": "m"}
-    with pytest.raises(
-        InputError, match=r"parts.front left wheel.region .* 65\.2, 61\.3\] m; is the unit 'm'"
-    ):
-        made("BYD Song L EV 2024", FOLDER, **record)

@@ -16,6 +16,7 @@ from lowalt.targets.make import make
 from lowalt.targets.mesh_files import read_mesh
 from lowalt.targets.records import merge
 from meshes import TABLE, box, car_record, made, plain, quad_record
+from tables import rows
 
 TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
 
@@ -24,8 +25,6 @@ TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
     ("name", "text", "reason"),
     [
         ("empty.stl", b"", "no triangle|not a readable"),
-        ("empty.obj", "", "no triangle|not a readable"),
-        ("points.obj", "v 0 0 0\nv 1 0 0\n", "no triangle|not a readable"),
         ("one.obj", TRIANGLE, "1 triangles with an area"),
         ("nan.obj", TRIANGLE.replace("v 0 1 0", "v 0 nan 0") * 4, "NaN"),
         ("inf.obj", TRIANGLE.replace("v 0 1 0", "v 0 inf 0") * 4, "NaN, infinite"),
@@ -61,32 +60,7 @@ def test_a_machine_without_pymeshlab_is_told_what_to_install(quad, monkeypatch):
 
 @pytest.mark.parametrize(
     ("path", "value", "names"),
-    [
-        (["unit"], "inch", "unit"),
-        (["up"], "up", "up"),
-        (["front"], "-z", "two different axes"),
-        (["size_is"], "tall", "size_is"),
-        (["colour"], "red", "colour"),
-        (["scale"], 2, "scale"),
-        (["moving_share"], 1, "moving_share"),
-        (["parts", "front right", "hinge"], [0, 0], "front right"),
-        (["parts", "front right", "kind"], "wheel", "expected rotor"),
-        (["parts", "front right", "axis"], [0, 0, 0], "axis is zero"),
-        (["parts", "front right", "parent"], "body", "parent"),
-        (["parts", "front right", "region"], {"box": [[0, 0, 0], [1, 1, 1]]}, "front right"),
-        (["parts", "body", "meshes", 0, "file"], "/etc/body.stl", "inside the folder"),
-        (["parts", "body", "meshes", 0, "file"], "../body.stl", "inside the folder"),
-        (["parts", "body", "meshes", 0, "geometry"], ["seat"], "geometry .'seat'. is not in it"),
-        (["parts", "body", "meshes", 0, "unit"], "furlong", "furlong"),
-        (["points"], 4, "leave none for the body"),
-        (["unit"], "in", "part front left measures 0.00508 m in a mesh of 0.205 m.* is the unit"),
-        (
-            ["parts", "front right", "meshes", 0, "unit"],
-            "in",
-            "part front right measures .* is the unit",
-        ),
-        (["parts", "front right"], {"kind": "body"}, "front right"),
-    ],
+    rows("meshes", "records"),
 )
 def test_bad_records_are_refused_by_key_and_value(path, value, names, quad):
     record = quad_record()
@@ -199,20 +173,7 @@ def test_a_child_may_sort_before_its_parent(bird):
 
 @pytest.mark.parametrize(
     ("name", "change", "words"),
-    [
-        (
-            "right inner",
-            {"parent": "right outer"},
-            "parent is 'right .*', which hangs on 'right .*' itself",
-        ),
-        ("right inner", {"kind": "body"}, "2 of kind body"),
-        ("body", {"kind": "wing"}, "0 of kind body"),
-        (
-            "right outer",
-            {"region": {"box": [[0.03, None, -0.01], [None, None, 0.01]]}},
-            "parts 'right inner' and 'right outer' take the same surface",
-        ),
-    ],
+    rows("meshes", "parts"),
 )
 @pytest.mark.parametrize("order", [1, -1])
 def test_parts_that_contradict_one_another_are_refused_whatever_their_order(
@@ -248,20 +209,7 @@ def wheeled(tmp_path, axis=0, centre=0.33, count=4, turns=None) -> dict:
 
 @pytest.mark.parametrize(
     ("changes", "words"),
-    [
-        (
-            {"centre": 1.3},
-            "fl, fr, rl, rr: its centre lies 0.9 m above .* a body 1 m high.*`up` .--up. reversed",
-        ),
-        (
-            {"axis": 1},
-            "fl, fr, rl, rr: its surface measures 0.66 m along its axle and 0.2 x 0.66 m across",
-        ),
-        (
-            {"turns": [0, 1, 0]},
-            r"rr: its axle points front, .0.0, 1.0, 0.0. .* expected right or left",
-        ),
-    ],
+    rows("meshes", "wheels"),
 )
 def test_wheels_that_cannot_roll_are_refused_with_their_measures(changes, words, tmp_path):
     with pytest.raises(InputError, match=words):

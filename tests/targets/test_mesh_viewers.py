@@ -5,28 +5,8 @@ import pytest
 
 from lowalt.files.errors import InputError
 from lowalt.targets.mesh_files import pieces, read_mesh, stated_unit_m
-from real_inputs import FOLDER
-from shown_meshes import FACES, TETRAHEDRON, check_as_viewers_show, dae, measures, prism
-
-FAULTS = FOLDER / "faults" / "meshes"
-
-
-@pytest.mark.skipif(not FAULTS.is_dir(), reason=f"no real inputs: {FOLDER} lacks faults/")
-@pytest.mark.parametrize(
-    ("name", "extent", "area", "volume", "unit"),
-    [
-        ("neg.obj", [11, 1, 1], 2 * 2.366, 2 / 6, None),
-        ("pos.obj", [11, 1, 1], 2 * 2.366, 2 / 6, None),
-        ("concave.obj", [2, 2, 0.1], 2.32, 0.076, None),
-        ("box.dae", [100, 100, 20], 28000, 2e5, None),
-        ("comment.dae", [100, 100, 20], 28000, 2e5, None),
-        ("comment2.dae", [100, 100, 20], 28000, 2e5, 0.0254),
-    ],
-)
-def test_small_files_made_for_readers_are_read_as_a_viewer_shows_them(
-    name, extent, area, volume, unit
-):
-    check_as_viewers_show(FAULTS / name, extent, area, volume, unit)
+from shown_meshes import FACES, TETRAHEDRON, dae, measures, prism
+from tables import rows
 
 
 def test_negative_indices_count_back_from_the_vertices_so_far(tmp_path):
@@ -53,15 +33,7 @@ def test_an_obj_with_a_corner_that_is_no_vertex_or_no_number_is_refused(line, tm
 
 @pytest.mark.parametrize(
     ("comment", "metres"),
-    [
-        ("# File units = inches", 0.0254),
-        ("# Units: mm", 0.001),
-        ("# unit 1 foot", 0.3048),
-        ("#units in metres", 1.0),
-        ("# Unit: in", 0.0254),
-        ("# the unit of all this is love", None),
-        ("o unit: mm", None),
-    ],
+    rows("units", "comments"),
 )
 def test_a_unit_in_an_obj_s_comment_counts(comment, metres, tmp_path):
     (tmp_path / "a.obj").write_text(comment + "\nv 0 0 0\n")

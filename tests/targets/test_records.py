@@ -23,6 +23,7 @@ from lowalt.targets.records import (
     with_row,
 )
 from lowalt.workflow.run import Run
+from tables import rows
 
 ROOT = Path(__file__).parents[2]
 TABLE = ROOT / "config/targets.csv"
@@ -83,24 +84,7 @@ def test_a_later_file_replaces_whole_records(tmp_path, written):
 
 @pytest.mark.parametrize(
     ("change", "message"),
-    [
-        ({"source": "clay"}, r"Crow: source: value 'clay', expected one of"),
-        ({"colour": "black"}, r"Crow: record: unknown key\(s\) \['colour'\]"),
-        ({"points": 0}, "Crow: points: value 0, expected at least 1"),
-        ({"points": True}, "Crow: points: value True"),
-        ({"like": "Boat"}, "Crow: like: value 'Boat', expected one of"),
-        ({"sources": {"maker": 1}}, r"Crow: sources\.maker: value 1, expected type string"),
-        ({"rcs_m2_per_point": -1}, "Crow: rcs_m2_per_point: value -1, expected at least 0"),
-        ({"model": "plane"}, r"Crow: model is 'plane', expected one of \['bird'\]"),
-        ({"size_is": "weight"}, r"Crow: size_is is 'weight', expected one of"),
-        ({"flap": {"speed": 3}}, r"Crow: flap: unknown key\(s\) \['speed'\]"),
-        ({"flap": {"mean_deg": "up"}}, r"Crow: flap\.mean_deg: value 'up', expected type number"),
-        ({"figures": {"length": [46, "cm", "reference"]}}, r"Crow: figures \[.*missing or unknown"),
-        (
-            {"coaxial": True},
-            r"Crow: \['coaxial'\] are not for model bird, expected \['flap'\] at most",
-        ),
-    ],
+    rows("records", "records"),
 )
 def test_wrong_records_are_refused_by_key_and_value(tmp_path, written, change, message):
     with pytest.raises(InputError, match=message) as refusal:
@@ -110,69 +94,7 @@ def test_wrong_records_are_refused_by_key_and_value(tmp_path, written, change, m
 
 @pytest.mark.parametrize(
     ("name", "figure", "value", "message"),
-    [
-        (
-            "Crow",
-            "length",
-            [46, "furlong", "reference"],
-            r"length: unit is 'furlong', expected one of \['mm', 'cm', 'm'",
-        ),
-        ("Crow", "length", [46, 1, "reference"], r"figures\.length: unit is '1'"),
-        (
-            "Crow",
-            "length",
-            [-46, "cm", "reference"],
-            r"length: value is -46, expected a positive number",
-        ),
-        (
-            "Crow",
-            "length",
-            [float("nan"), "cm", "reference"],
-            r"length\.0: value nan, expected type number",
-        ),
-        (
-            "Crow",
-            "length",
-            [46, "cm", "hearsay"],
-            r"length: source is 'hearsay', expected 'estimate' or one of \['auth",
-        ),
-        (
-            "Crow",
-            "length",
-            46,
-            r"length: value 46, expected type array \(\[value, unit, source\]\)",
-        ),
-        (
-            "DJI Mini 4 Pro",
-            "spacing_ratio",
-            [1.6, 1, "estimate"],
-            r"diameter is 0\.157 m, expected less than",
-        ),
-        (
-            "DJI Avata",
-            "motor_diagonal",
-            [30, "cm", "maker"],
-            r"motor diagonal is 0\.3 m in a craft of 0\.2048 m",
-        ),
-        (
-            "EH 216 S",
-            "propeller_diameter",
-            [6, "m", "estimate"],
-            r"propeller_diameter is 6 m, expected less than",
-        ),
-        ("Wild goose", "neck", [0.7, 1, "estimate"], r"add up to 1\.06 of the length"),
-        ("Owl", "wrist", [1.2, 1, "estimate"], r"figures\.wrist is 1\.2, expected 0\.1 to 0\.9"),
-        ("Owl", "span", [10, "cm", "reference"], r"figures\.span is 0\.1 m"),
-        (
-            "Audi A6L 2019",
-            "wheel_base",
-            [4.5, "m", "maker"],
-            r"are 5\.41 m, expected less than the 5\.0 m length",
-        ),
-        ("Audi A6L 2019", "track", [2, "m", "maker"], r"figures\.track is 2 m"),
-        ("Audi A6L 2019", "roof_rear", [0.3, 1, "estimate"], r"expected rising from 0\.18 to 1"),
-        ("Audi A6L 2019", "hood_height", [0.9, 1, "estimate"], r"expected rising and below 1"),
-    ],
+    rows("records", "figures"),
 )
 def test_wrong_figures_and_impossible_shapes_are_refused(
     tmp_path, written, name, figure, value, message
@@ -185,25 +107,7 @@ def test_wrong_figures_and_impossible_shapes_are_refused(
 
 @pytest.mark.parametrize(
     ("name", "changes", "message"),
-    [
-        (
-            "DJI Matrice 600 Pro",
-            {},
-            "model is tanker, expected n_rotors_or_wings 4 in its row, not 6",
-        ),
-        (
-            "DJI Mini 2",
-            {"coaxial": True},
-            r"\['coaxial'\] are not for model folding, expected \[\] at most",
-        ),
-        ("DJI Mini 2", {"points": 8}, "8 points for 5 parts leave none for the body"),
-        ("Owl", {"points": 4}, "4 points for 5 parts leave none for the body"),
-        (
-            "Type-A Firefighting UAV",
-            {"size_is": "span over ducts"},
-            "size_is is 'span over ducts', .* with model tanker",
-        ),
-    ],
+    rows("records", "layouts"),
 )
 def test_layouts_that_do_not_fit_the_craft_are_refused(tmp_path, written, name, changes, message):
     record = written[name if changes else "Type-A Firefighting UAV"]
@@ -222,14 +126,7 @@ def test_unknown_and_missing_subtypes_are_refused(tmp_path):
 
 @pytest.mark.parametrize(
     ("text", "message"),
-    [
-        ("", "expected a mapping"),
-        ("Crow: 3", "Crow is 3, expected a mapping"),
-        (
-            "Crow: {source: builtin}\nOwl: {source: gait}\nCrow: {source: gait}\n",
-            r"key 'Crow' stands twice \(line 3\)",
-        ),
-    ],
+    rows("records", "files"),
 )
 def test_files_that_hold_no_records_or_one_twice_are_refused(tmp_path, text, message):
     (tmp_path / "bad.yaml").write_text(text)
@@ -239,13 +136,7 @@ def test_files_that_hold_no_records_or_one_twice_are_refused(tmp_path, text, mes
 
 @pytest.mark.parametrize(
     ("old", "new", "message"),
-    [
-        ("size_m", "size", r"columns \['size', 'size_m'\] missing or unknown"),
-        ("0.2192", "-1", r"DJI Mini 2: size_m is '-1', expected a positive number"),
-        ("0.2192", "big", r"DJI Mini 2: size_m is 'big'"),
-        ("UAV,1,", "4x4,1,", r"table of targets: category '4x4', expected a letter"),
-        ("DJI Mini 4 Pro", "DJI Mini 2", r"DJI Mini 2: named twice"),
-    ],
+    rows("records", "tables"),
 )
 def test_wrong_tables_are_refused(tmp_path, old, new, message):
     (tmp_path / "table.csv").write_text(TABLE.read_text().replace(old, new))
@@ -255,13 +146,7 @@ def test_wrong_tables_are_refused(tmp_path, old, new, message):
 
 @pytest.mark.parametrize(
     ("name", "words"),
-    [
-        ("/abs/m.amc", "inside the folder"),
-        ("../m.amc", "inside the folder"),
-        ("C:m.amc", "inside the folder"),
-        ("m{1}.amc", "expected a name without"),
-        ("m\n.amc", "expected a name without"),
-    ],
+    rows("records", "names"),
 )
 def test_a_file_outside_the_folder_or_of_a_name_that_the_workflow_cannot_pass_on_is_refused(
     name, words
@@ -323,14 +208,7 @@ def test_a_single_record_replaces_that_of_its_subtype_alone_and_cells_of_its_row
 
 @pytest.mark.parametrize(
     ("row", "message"),
-    [
-        ({"colour": "red"}, "expected cells of the columns"),
-        ([1], "expected cells of the columns"),
-        ({"len_m": -1}, r"here: row: len_m is '-1', expected a positive number"),
-        ({"speed_lo": -1}, r"here: row: speed_lo is '-1', expected a number of at least 0"),
-        ({"category": "Vehicle", "unseen_protocol": "both"}, "seen or unseen"),
-        ({"len_m": 4}, "expected a category"),
-    ],
+    rows("records", "rows"),
 )
 def test_wrong_rows_are_refused_and_a_target_may_stand_still(row, message):
     with pytest.raises(InputError, match=message):

@@ -7,60 +7,25 @@ import itertools
 
 import numpy as np
 import pytest
-import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lowalt.files.errors import InputError
 from lowalt.targets.surfaces import (
-    Surface,
     airfoil,
-    box,
     cylinder,
     ellipsoid,
     face_normals,
-    foil,
-    hull,
     inside,
-    loft,
     merged,
     ring,
     sample_faces,
     superellipse,
     thin,
-    tube,
     volume,
 )
 
 LENGTH = st.floats(0.01, 10)
-
-
-def assert_closed(surface: Surface) -> None:
-    """Assert by trimesh that the surface is one closed shell with consistent outward faces."""
-    mesh = trimesh.Trimesh(surface.vertices, surface.faces, process=False)
-    assert mesh.is_watertight and mesh.is_winding_consistent
-    assert mesh.volume > 0
-    assert volume(surface) == pytest.approx(mesh.volume, rel=1e-9)
-
-
-@pytest.mark.parametrize(
-    "surface",
-    [
-        ellipsoid((1, 2, 3)),
-        cylinder(0.3, (0, 0, 0), (1, 2, -1)),
-        tube([(0, 0, 0), (0, 1, 0.2), (0, 2, 0)], [0.3, 0.2, 0.1]),
-        tube([(0, 0, 1), (0, 0, 0)], 0.1),
-        hull([(1, 0.3, -0.1, 0.2), (0, 0.5, -0.2, 0.4), (-1, 0.2, 0, 0.1)], 2.5, bow=0.1),
-        hull([(-1, 0.3, -0.1, 0.2), (1, 0.5, -0.2, 0.4)], 2.5, bow=0.1),
-        box((1, 2, 3), (4, 5, 6)),
-        ring(superellipse(0.1, 0.2) + np.array([1, 0])),
-        foil([(0, 0, 0, 0.2, 0.3), (1, 0.1, 0, 0.1, 0.1)], 0.12),
-    ],
-    ids=lambda surface: len(surface.faces),
-)
-def test_primitives_are_closed_and_outward(surface):
-    assert_closed(surface)
-    assert_closed(surface.mapped(np.diag([-1.0, 1, 1])).moved((1, 2, 3)))
 
 
 @settings(max_examples=30, deadline=None)
@@ -83,15 +48,6 @@ def test_volumes_tend_to_the_formulas():
     # Pappus: area of the section times the way of its centroid.
     torus = ring(superellipse(0.1, 0.1, sides=200) + np.array([2, 0]), sides=200)
     assert volume(torus) == pytest.approx(np.pi * 0.01 * 2 * np.pi * 2, rel=1e-3)
-
-
-def test_a_unit_cube_from_a_loft():
-    square = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.0]])
-    cube = loft(np.stack([square, square + np.array([0, 0, 1])]))
-    assert volume(cube) == pytest.approx(1.0, abs=1e-15)
-    np.testing.assert_array_equal(
-        inside(cube, np.array([[0.5, 0.5, 0.5], [1.5, 0.5, 0.5], [0.9, 0.1, 0.2]])), [1, 0, 1]
-    )
 
 
 def test_merging_keeps_volumes_and_hollows():

@@ -5,8 +5,6 @@ Parts turn the right way.
 
 import hashlib
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -17,8 +15,10 @@ from scipy.spatial.transform import Rotation
 
 from builtin_records import BIRDS, CARS, NAMES, RECORDS, TABLE, UAVS, WRITTEN
 from lowalt.files.atomic import slug
+from lowalt.files.errors import InputError
 from lowalt.files.yaml_files import load_yaml
 from lowalt.targets import bird
+from lowalt.targets.__main__ import main as command
 from lowalt.targets.assemble import allot, turn
 from lowalt.targets.builtin import MODULES, builtin_cloud
 from lowalt.targets.cloud import check, read, write
@@ -26,6 +26,7 @@ from lowalt.targets.gallery import main as gallery
 from lowalt.targets.make import make
 from lowalt.targets.records import merge, read_records
 from lowalt.targets.surfaces import inside
+from options import words
 
 ROOT = Path(__file__).parents[2]
 SEED = load_yaml("config/default.yaml")["seed"]
@@ -285,38 +286,23 @@ def test_rolling_diameter_wing_beat_and_cross_section_may_be_set():
     assert crow.record["flap"] == bird.FLAP | {"mean_deg": 5.0} and (crow.rcs_m2 == 0.01).all()
 
 
-def test_the_command_line_makes_the_same_cloud_and_refuses_an_unknown_source(tmp_path, clouds):
-    settings = tmp_path / "settings.json"
-    out = tmp_path / "seagull.npz"
-    command = [
-        sys.executable,
-        "-m",
-        "lowalt.targets",
-        "--settings",
-        f"@{settings}",
-        "--out",
-        str(out),
-    ]
+def test_the_command_makes_the_same_cloud_and_refuses_an_unknown_source(tmp_path, clouds):
+    settings, out = tmp_path / "settings.json", tmp_path / "seagull.npz"
+    line = words(settings=f"@{settings}", out=out)
     settings.write_text(json.dumps({"seed": SEED, "record": RECORDS["Seagull"]}))
-    subprocess.run(command, check=True, capture_output=True)
+    command(line)
     np.testing.assert_array_equal(read(out).points, clouds["Seagull"].points)
     settings.write_text(json.dumps({"seed": 1, "record": RECORDS["Seagull"] | {"source": "clay"}}))
-    refused = subprocess.run(command, capture_output=True, text=True)
-    assert refused.returncode == 2 and "record.source is 'clay'" in refused.stderr
+    with pytest.raises(InputError, match=r"record\.source is 'clay'"):
+        command(line)
 
 
 def test_the_gallery_draws_every_cloud(tmp_path, clouds):
-    files = [
-        tmp_path / f"{slug(name)}.npz"
-        for name in ("DJI Mini 2", "EH 216 S", "Crow", "Xiaomi SU7 2024")
-    ]
-    for name, file in zip(
-        ("DJI Mini 2", "EH 216 S", "Crow", "Xiaomi SU7 2024"), files, strict=True
-    ):
-        write(file, clouds[name])
-    gallery(["--clouds", *map(str, files), "--out", str(tmp_path / "gallery.png")])
+    files = []
+    for name in ("DJI Mini 2", "EH 216 S", "Crow", "Xiaomi SU7 2024"):
+        files.append(tmp_path / f"{slug(name)}.npz")
+        write(files[-1], clouds[name])
+    gallery(words(clouds=files, out=tmp_path / "gallery.png"))
     picture = np.asarray(Image.open(tmp_path / "gallery.png").convert("RGB"))
-    assert (
-        picture.shape[1] > 1000
-        and len({tuple(pixel) for pixel in picture[::7, ::7].reshape(-1, 3)}) > 20
-    )
+    assert picture.shape[1] > 1000
+    assert len(np.unique(picture[::7, ::7].reshape(-1, 3), axis=0)) > 20

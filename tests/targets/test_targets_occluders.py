@@ -14,6 +14,7 @@ from lowalt.targets import occluders
 from lowalt.targets.builtin import MODULES
 from lowalt.targets.skeleton import NODES, PARENTS
 from lowalt.targets.surfaces import Surface, hull, longest_edge, quartered
+from tables import rows
 
 
 def areas(corners):
@@ -95,11 +96,7 @@ def test_a_craft_s_surfaces_move_with_their_parts_and_come_back_from_a_file(tmp_
 
 @pytest.mark.parametrize(
     ("change", "words"),
-    [
-        ({"source": "mesh"}, "needs the folder of real inputs"),
-        ({"source": "clay"}, "record.source is 'clay'"),
-        ({"source": "gait", "gait": "trot"}, "gait trot has no surfaces"),
-    ],
+    rows("occluders", "records"),
 )
 def test_a_target_without_surfaces_is_refused(change, words):
     with pytest.raises(InputError, match=words):

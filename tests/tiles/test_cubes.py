@@ -11,32 +11,28 @@ import numpy as np
 import pytest
 
 import pointwise_echo
-from lowalt.config.layers import canonical
+from lowalt.config.layers import merge
 from lowalt.config.network import SPEED_OF_LIGHT
 from lowalt.echo import Rigid
-from lowalt.files.atomic import slug
 from lowalt.files.errors import InputError
-from lowalt.motion import poses, write_table
+from lowalt.motion import poses
 from lowalt.noise.awgn import add_noise
 from lowalt.numerics.streams import stream
 from lowalt.scene.effects.detection import canceller
-from lowalt.shards.build import rows_of
+from lowalt.shards import ShardSet
 from lowalt.shards.dataset import Dataset
 from lowalt.shards.stored_cubes import cubes_of, of_cubes
 from lowalt.spectra import Spectra, spectrum
 from lowalt.spectra.cube import TRUTH, Cube
 from lowalt.spectra.kinds import hrrp, range_doppler
-from lowalt.targets.cloud import write as write_cloud
-from lowalt.tiles.__main__ import main as tiles
 from lowalt.tiles.cubes import Cubes
-from lowalt.tiles.png import decode
 from lowalt.tiles.render import Renderer, split
-from lowalt.tiles.tile_files import Tiles
 from small_configuration import configuration
+from stage_runs import check_members, run_stages
 
 SHOWN = {"hrrp": {"window": 2, "hop": 1, "cells": 9}, "range_doppler": {"cells": 9, "points": 512}}
 SNRS = [3.0, float("inf")]
-LAND = {"clutter": {"gamma": 0.5}, "canceller": {"kind": "mean"}}
+LAND = {"clutter": {"gamma": 0.5, "reach_m": 200.0}, "canceller": {"kind": "mean"}}
 
 
 @pytest.fixture(scope="module")
@@ -58,6 +54,11 @@ def without(config: dict) -> dict:
     }
 
 
+def cubes_of_row(maker, row: dict, snr_db: float) -> list[Cube]:
+    """The cubes of all stations of a motion model at an SNR (dB)."""
+    return maker.cubes(row, snr_db, maker.signal(row, snr_db))
+
+
 def truth(cube: Cube, name: str) -> np.ndarray:
     return cube.truth[:, TRUTH.index(name)]
 
@@ -75,33 +76,14 @@ def test_images_of_cells_come_after_the_other_three_which_stay_as_without_them(d
         assert np.isin(found[:, 3].astype(float).mean(axis=2).argmax(axis=1), (15, 16)).all()
 
 
-def test_the_tiles_stage_draws_what_a_data_set_draws_on_the_spot(dataset, tmp_path):
-    chunk = next(iter(dataset.plan.chunks))
-    rows = rows_of(dataset, chunk)[:1]
-    block = {name: dataset.config[name] for name in ("network", "spectra", "images")}
-    write_table(tmp_path / "motion.csv", rows)
-    clouds = [tmp_path / f"{slug(name)}.npz" for name in dataset.clouds]
-    for path, cloud in zip(clouds, dataset.clouds.values(), strict=True):
-        write_cloud(path, cloud)
-    made = Dataset(dataset.config | {"effects": LAND}, dataset.clouds).maker
-    signals = np.stack([[made.signal(row, snr) for snr in SNRS] for row in rows])
-    np.save(tmp_path / "noisy.npy", signals)
-    cubes = {"seed": dataset.plan.seed, "tolerance": None, "effects": LAND, "snr_db": [3.0, "inf"]}
-    files = (
-        "--signals",
-        tmp_path / "noisy.npy",
-        "--motion",
-        tmp_path / "motion.csv",
-        "--clouds",
-        *clouds,
-    )
-    given = ["--settings", canonical({**block, "cubes": cubes}), *map(str, files)]
-    tiles([*given, "--out", str(tmp_path / "tiles.npz")])
-    found = Tiles(tmp_path / "tiles.npz")
-    again = pickle.loads(pickle.dumps(made))
-    for level in range(2):
-        assert found[level] == again.png(signals[0, level], rows[0], SNRS[level])
-    assert decode(found[0])[0].shape == (3 * 32, 5 * 32)
+def test_the_stages_draw_what_a_data_set_draws_on_the_spot(dataset, tmp_path):
+    one = {"targets": {"select": ["Owl"]}, "motion": {"models": 1, "models_per_chunk": 1}}
+    one["split"] = {"train": 1, "val": 0, "test": 0}
+    config = merge(dataset.config, {"effects": LAND, **one})
+    made = Dataset(config, dataset.clouds)
+    stored = ShardSet(run_stages(made, tmp_path, "image"))
+    check_members(pickle.loads(pickle.dumps(made)), stored)
+    assert stored.tile(0).shape == (3 * 32, 5 * 32)
 
 
 def test_cells_without_noise_are_those_of_the_echo_s_definition_and_the_chosen_ones_are_the_signal(
@@ -145,7 +127,7 @@ def test_noise_has_the_power_of_the_snr_in_every_cell_and_streams_of_its_own(dat
 def test_noise_of_cells_passes_the_canceller_as_the_signal_s_does(dataset):
     maker = Dataset(dataset.config | {"effects": LAND}, dataset.clouds).maker
     row = dataset.row(dataset.place(1))
-    quiet, noisy = (maker.cubes(row, snr, maker.signal(row, snr))[0] for snr in (np.inf, 3.0))
+    quiet, noisy = (cubes_of_row(maker, row, snr)[0] for snr in (np.inf, 3.0))
     power = maker.received(row)[1][0, 0]
     rng = stream(dataset.plan.seed, "cells", row["subtype"], row["model"], "A", 3.0)
     white = add_noise(np.zeros(quiet.cells.shape), 3.0, rng, power)

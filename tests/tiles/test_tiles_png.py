@@ -11,7 +11,7 @@ from PIL import Image
 
 from lowalt.files.errors import InputError
 from lowalt.tiles import colour_map, decode, encode, paint
-from lowalt.tiles.huffman import MATCH_BITS, MATCH_EXTRA, MATCH_SYMBOL, zlib_compress
+from lowalt.tiles.huffman import zlib_compress
 from lowalt.tiles.huffman_code import code_lengths
 
 BYTES = [
@@ -65,18 +65,6 @@ def test_code_lengths_are_a_code_as_short_as_can_be(counts, longest):
     assert entropy - 1e-9 <= (share * lengths[used]).sum()
     if longest == 15 and counts[used].min() * 1000 > counts.sum():
         assert (share * lengths[used]).sum() <= entropy + 1
-
-
-def test_match_lengths_are_those_of_the_format():
-    """The table of RFC 1951 by its corners.
-
-    257 is 3, 265 starts at 11 with one extra bit, 284 ends at 257, 285 is 258.
-    """
-    assert [MATCH_SYMBOL[n] for n in (3, 10, 11, 12, 13, 18, 19, 257, 258)] == [
-        257, 264, 265, 265, 266, 268, 269, 284, 285,
-    ]  # fmt: skip
-    assert [MATCH_BITS[n] for n in (3, 11, 19, 35, 67, 131, 257, 258)] == [0, 1, 2, 3, 4, 5, 5, 0]
-    assert [MATCH_EXTRA[n] for n in (11, 12, 257)] == [0, 1, 30]
 
 
 @settings(max_examples=30, deadline=None)
