@@ -169,7 +169,7 @@ def test_near_ties_of_cells_go_to_the_truly_strongest():
         result = echo_signal(net, station, edge, 1.0, (150.0, 1.0, 26.0))
         with mpmath.workdps(60):
             values = reference.cells_mp(
-                net, station, edge[0].tolist(), [1.0], (150.0, 1.0, 26.0), [30, 31], 60
+                net, station, edge[0].tolist(), [1.0], (150.0, 1.0, 26.0), [30, 31]
             )
             strengths = [abs(value) for value in values]
         assert result.gap[0] == 0 and result.cell[0] == 30 + (strengths[1] > strengths[0])
