@@ -184,7 +184,8 @@ def zoo(doors):
 
 
 ALIKE = ("an effect beside the run", "the table of targets by a link", "a flight log")
-"""Attacks that every entry is given: code, a file that is read early and one that is read late."""
+"""Attacks that are tried at every entry: one names code, one a file that is read first, and one a
+file that is read late."""
 PAIRS = {(entry, attack) for entry in ENTRIES for attack in ALIKE} | {
     ("Dataset", attack) for attack in CODE | PLACES
 }
@@ -210,8 +211,8 @@ def test_a_run_s_configuration_names_no_folder_of_inputs_outside(doors, entry, a
 def test_a_run_s_configuration_is_known_in_every_disguise(
     doors, entry, path, beside, whole, linked, capsys
 ):
-    """A whole configuration or its effects alone, under any name, behind a link, and beside a file
-    that came with it.
+    """A configuration counts as a run's if it is whole, or if it lies beside the files of a run; its
+    name does not matter, nor whether a link leads to it.
     """
     config = attacked(doors, CODE["an effect beside the run"])
     held_path = doors / (linked or path)

@@ -14,7 +14,6 @@ of the same files. The rows of radar "any" hold all radars that have an own netw
 """
 
 import argparse
-import hashlib
 import math
 from dataclasses import asdict, dataclass
 from functools import lru_cache
@@ -35,6 +34,7 @@ from accuracy import (
 )
 from fourth_radar import RECORDS as FOURTH
 from labels import intervals_of, read_labels
+from measured_tables import write_measured
 from recorded_sets import Measured, recordings, usable
 from torch import nn
 
@@ -46,10 +46,9 @@ from lowalt.extensions.recordings.presence import speeds_shown
 from lowalt.extensions.recordings.record import record
 from lowalt.extensions.recordings.twin import Twin, twin_of
 from lowalt.extensions.recordings.twin_scenes import SCENES, Library, clouds_of, intervals
-from lowalt.extensions.recordings.twin_training import settings, train
+from lowalt.extensions.recordings.twin_training import kept_signals, settings, train
 from lowalt.extensions.recordings.window_samples import Windows, facts
-from lowalt.files.atomic import replacing
-from lowalt.files.csv_tables import read_csv, write_csv
+from lowalt.files.csv_tables import read_csv
 from lowalt.files.shipped import shipped
 from lowalt.files.yaml_files import load_yaml
 from lowalt.machine.progress import reported
@@ -133,8 +132,8 @@ def alike(one: Twin, other: Twin, apart: float) -> bool:
 
 @lru_cache(maxsize=64)
 def _cells(twin: Twin, length: int, view: View, size: int) -> tuple[np.ndarray, ...]:
-    """Of spectra of `length` symbols: the cells (n,) that a view shows, by row; the place at which
-    each row's cells begin, and which rows (size,) have any.
+    """The cells (n,) of spectra of `length` symbols that a view shows, row by row; the number of the
+    first cell of each row that has any, and which rows (size,) these are.
 
     Where cells are wider than rows, each row has the cell that holds its middle.
     """
@@ -184,10 +183,10 @@ def rendered(
     steps = Scale("decibel", floor_db).thresholds(LEVELS)
     result = np.empty((len(intervals), len(views), size, size), np.uint8)
     for number, interval in enumerate(intervals):
-        for place, view in enumerate(views):
+        for channel, view in enumerate(views):
             shown = image(interval, twin, view, size)
             share = shown / max(shown.max(), 1e-300)
-            result[number, place] = np.searchsorted(steps, share.ravel(), side="right").reshape(
+            result[number, channel] = np.searchsorted(steps, share.ravel(), side="right").reshape(
                 size, size
             )
     return result
@@ -247,14 +246,7 @@ class Drawing:
             fold=fold,
             number=number,
         )
-        path = folder / f"{hashlib.sha256(made_of.encode()).hexdigest()[:16]}.npz"
-        if path.is_file():
-            with np.load(path, allow_pickle=False) as data:
-                return data["intervals"], data["subtypes"].tolist()
-        found, subtypes = self.windows(fold, number)
-        with replacing(path) as temporary, temporary.open("wb") as file:
-            np.savez(file, intervals=found, subtypes=np.array(subtypes))
-        return found, subtypes
+        return kept_signals(made_of, folder, lambda: self.windows(fold, number))
 
 
 def samples(drawing: Drawing, fold: str, views: list[View], size: int, folder: Path) -> Windows:
@@ -344,7 +336,7 @@ def simulated_rows(network: nn.Module, windows: Windows, seed: int) -> list[list
     for label, category in enumerate(CATEGORIES):
         of_class = windows.facts.label == label
         right_percent = 100 * float((named[of_class] == label).mean())
-        result.append([seed, category, int(of_class.sum()), f"{right_percent:.1f}"])
+        result.append([seed, category, int(of_class.sum()), right_percent])
     return result
 
 
@@ -370,10 +362,10 @@ def own_rows(path: Path) -> list[list]:
 def compared(rows: list[list], own: list[list], seed: int) -> list[list]:
     """Return the rows of `COLUMNS`: the accuracy of this network, and of each radar's own. The rows
     of `NAME` hold the radars that have one."""
-    places = [ACCURACY.index(key) for key in OWN]
+    columns = [ACCURACY.index(key) for key in OWN]
     with_own = {row[0] for row in own}
     of_own = {
-        tuple(row[:3]): [row[place] for place in places]
+        tuple(row[:3]): [row[column] for column in columns]
         for row in accuracy_rows(together(own, with_own), seed)
     }
     nothing = [math.nan] * len(OWN)
@@ -381,13 +373,6 @@ def compared(rows: list[list], own: list[list], seed: int) -> list[list]:
         [*row, *of_own.get(tuple(row[:3]), nothing)]
         for row in accuracy_rows(together(rows, with_own), seed)
     ]
-
-
-def cell(value: object) -> object:
-    """A cell of a table: a float with five significant digits, NaN as an empty cell."""
-    if isinstance(value, float):
-        return "" if math.isnan(value) else f"{value:.5g}"
-    return value
 
 
 def main(arguments: list[str]) -> None:
@@ -421,17 +406,9 @@ def main(arguments: list[str]) -> None:
         rows += rows_of(folder / "model.safetensors", seed, inputs, block)
     own = own_rows(REFERENCE / "measured-recognition.csv")
     table = compared(rows, own, block["recognition"]["seed"])
-    write_csv(
-        options.out / "measured-any-radar.csv",
-        COLUMNS,
-        [[cell(one) for one in row] for row in table],
-    )
-    write_csv(
-        options.out / "any-radar-files.csv",
-        RECOGNITION,
-        [[cell(one) for one in row] for row in rows],
-    )
-    write_csv(options.out / "any-radar-simulated.csv", SIMULATED, simulated)
+    write_measured(options.out, "any-radar", COLUMNS, table)
+    write_measured(options.out, "any-radar-files", RECOGNITION, rows)
+    write_measured(options.out, "any-radar-simulated", SIMULATED, simulated)
 
 
 if __name__ == "__main__":

@@ -9,7 +9,6 @@ measured-*.csv, the pictures and report.html. `recognise` trains networks into t
 """
 
 import argparse
-import math
 import os
 from functools import partial
 from pathlib import Path
@@ -17,13 +16,14 @@ from typing import NamedTuple
 
 import numpy as np
 from any_speed import ANY_SPEED, any_speed
+from measured_tables import write_measured
 from recorded_sets import Measured, recordings, usable
 
 from lowalt.config.command import dispatch, run
 from lowalt.extensions.recordings.twin import RADARS
 from lowalt.extensions.recordings.twin_scenes import Library
 from lowalt.files.atomic import replacing
-from lowalt.files.csv_tables import read_csv, write_csv
+from lowalt.files.csv_tables import read_csv
 from lowalt.files.yaml_files import load_yaml
 from lowalt.machine.side_by_side import together
 
@@ -70,20 +70,6 @@ def _inputs(name: str, description: str, arguments: list[str], *, trains: bool =
     options = line.parse_args(arguments)
     library = Library.read(options.radars)
     return Inputs(options, library, usable(recordings(options.inputs), library))
-
-
-def _cell(value: object) -> object:
-    """A cell of a table: a float with five significant digits, NaN as an empty cell."""
-    if isinstance(value, float):
-        return "" if math.isnan(value) else f"{value:.5g}"
-    return value
-
-
-def _write(folder: Path, name: str, columns: tuple[str, ...], rows: list[list]) -> None:
-    """Write rows as measured-NAME.csv into a folder."""
-    write_csv(
-        folder / f"measured-{name}.csv", columns, ([_cell(value) for value in row] for row in rows)
-    )
 
 
 def pairs(arguments: list[str]) -> None:
@@ -141,9 +127,9 @@ def compare(arguments: list[str]) -> None:
         distance_rows(name, inputs.recordings, library, recorded, block["mended"], options.count)
         for name in library.twins
     ]
-    _write(options.out, "figures", FIGURES, [row for rows, _ in parts for row in rows])
-    _write(options.out, "files", FILES, [row for _, rows in parts for row in rows])
-    _write(options.out, "distances", DISTANCES, [row for rows in apart for row in rows])
+    write_measured(options.out, "figures", FIGURES, [row for rows, _ in parts for row in rows])
+    write_measured(options.out, "files", FILES, [row for _, rows in parts for row in rows])
+    write_measured(options.out, "distances", DISTANCES, [row for rows in apart for row in rows])
 
 
 def noise(arguments: list[str]) -> None:
@@ -151,7 +137,7 @@ def noise(arguments: list[str]) -> None:
     inputs = _inputs("noise", noise.__doc__, arguments)
     from noise_floors import NOISE, row
 
-    _write(
+    write_measured(
         inputs.options.out,
         "noise",
         NOISE,
@@ -174,7 +160,7 @@ def presence(arguments: list[str]) -> None:
     library = Library.read(options.radars)
     rows = [row for name in library.twins for row in noise_rows(name, library, options.noises)]
     rows += [row for name in library.twins for row in target_rows(name, library, options.scenes)]
-    _write(options.out, "presence", PRESENCE, rows)
+    write_measured(options.out, "presence", PRESENCE, rows)
 
 
 def recognise(arguments: list[str]) -> None:
@@ -204,9 +190,9 @@ def recognise(arguments: list[str]) -> None:
     ]
     found = list(reversed(together(calls, options.jobs, "spawn")))
     windows, rows = ([row for of_radar in found for row in of_radar[part]] for part in (0, 1))
-    _write(options.out, "windows", WINDOWS, windows)
-    _write(options.out, "recognition", RECOGNITION, rows)
-    _write(options.out, "accuracy", ACCURACY, accuracy_rows(rows, block["seed"]))
+    write_measured(options.out, "windows", WINDOWS, windows)
+    write_measured(options.out, "recognition", RECOGNITION, rows)
+    write_measured(options.out, "accuracy", ACCURACY, accuracy_rows(rows, block["seed"]))
 
 
 def draw_labels(arguments: list[str]) -> None:

@@ -109,5 +109,5 @@ def test_the_table_has_each_labelled_recording_next_to_the_radar_s_own_network(t
     for key in ("right_percent", "low", "named_percent"):
         # The kept cells of each file are rounded as well.
         assert float(rows[0][f"own_{key}"]) == pytest.approx(float(of_class[key]), rel=1e-4)
-    simulated = read_csv(tmp_path / "out/any-radar-simulated.csv", *any_radar.SIMULATED)
+    simulated = read_csv(tmp_path / "out/measured-any-radar-simulated.csv", *any_radar.SIMULATED)
     assert len(simulated) == 8 and {row["windows"] for row in simulated} == {"1"}

@@ -61,6 +61,12 @@ def test_every_case_is_as_hard_as_its_name_says():
     for name, wanted in cells.items():
         assert seen(name)[0][:-1] / CELL == pytest.approx([wanted], rel=1e-12)
     assert seen("past the unambiguous range")[0] / CELL == pytest.approx(1.7 * 256, rel=0.1)
+    metres = {"at 1 cm": 0.01, "at 100 km": 1e5, "100 km at 77 GHz": 1e5, "one point": 77.7}
+    for name, wanted in metres.items():
+        assert seen(name)[0][:-1] == pytest.approx(wanted, rel=2e-5)
+    at_77_ghz = CASES["100 km at 77 GHz"]
+    assert at_77_ghz.station.frequency_hz == at_77_ghz.network.carrier_hz == 77e9
+    assert len(CASES["one point"].points_m) == 1
     sizes = np.ptp(CASES["larger than its range"].points_m, axis=0)
     assert sizes.max() > seen("larger than its range")[0][-1]
     # A way there and back that differs by half a wave of the middle subcarrier.

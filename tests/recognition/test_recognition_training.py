@@ -374,12 +374,16 @@ def test_the_final_weights_are_those_validated_last_of_the_best(monkeypatch, vie
     ("block", "change"),
     [
         ("training", {"steps": 0}),
+        ("training", {"rate": -1.0}),
         ("training", {"precision": "fp16"}),
+        ("training", {"warmup": 2}),
         ("training", {"epochs": 3}),
         ("training", {"batch": True}),
         ("training", {"ema": math.nan}),
+        ("training", {"threads": 1.0}),
         ("augmentation", {"mirror": 1.5}),
         ("augmentation", {"mask_time": "0.1"}),
+        ("augmentation", {"flip": 1}),
     ],
 )
 def test_wrong_settings_are_refused_by_name(views, tmp_path, block, change):

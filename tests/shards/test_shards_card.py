@@ -26,7 +26,7 @@ from tables import rows
 
 
 def make_card(folder, **options):
-    """The card of the data set in a folder, with the configuration beside it and of a fixed day."""
+    """The card of the data set in a folder, dated a fixed day; config.yaml is in the same folder."""
     given = {"index": folder / "index.json", "config": folder / "config.yaml"}
     given |= {"date": "2026-01-31", "url": "https://example.org/trial"}
     main(words(**given | options))

@@ -11,7 +11,7 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lowalt.files.errors import InputWarning
+from lowalt.files.errors import InputError, InputWarning
 from lowalt.targets import cloud as clouds
 from lowalt.targets.mesh_files import read_mesh, suffixes
 from lowalt.targets.record_schema import record_files
@@ -353,3 +353,12 @@ def test_every_real_mesh_is_used_and_alone_becomes_a_valid_cloud():
     for name in files:
         cloud = made("DJI Mini 2", FOLDER, **plain(name, unit=UNITS.get(Path(name).name, "m")))
         assert len(cloud.points) == 171 and np.ptp(cloud.points, axis=0).max() < 5.0
+
+
+@needs_inputs
+def test_inches_given_as_metres_are_caught_by_the_published_size():
+    record = REAL["BYD Song L EV 2024"] | {"unit": "m"}
+    with pytest.raises(
+        InputError, match=r"parts.front left wheel.region .* 65\.2, 61\.3\] m; is the unit 'm'"
+    ):
+        made("BYD Song L EV 2024", FOLDER, **record)

@@ -12,6 +12,7 @@ import numpy as np
 C = 299_792_458
 """Speed of light (m/s), exact."""
 DIGITS = 50
+"""Decimal digits of all numbers here."""
 
 
 def _run(step, length: int):

@@ -12,8 +12,9 @@ from lowalt.recognition.intervals import Interval, model_weights
 from lowalt.recognition.predictions import Predictions
 
 BINS = 15
+"""Bins of confidence of the calibration error."""
 REPEATS = 400
-"""Bins of confidence of the calibration error, and repeats of a bootstrap."""
+"""Bootstrap samples of an interval."""
 LOOKED_FOR = 0
 """Label of the target class, whose detections and false alarms are counted: the first class."""
 FEWEST_MISSED = 10
@@ -58,8 +59,9 @@ def confusion(labels: np.ndarray, guesses: np.ndarray, classes: int) -> np.ndarr
 
 
 def calibration(probabilities: np.ndarray, labels: np.ndarray) -> dict[str, float]:
-    """Expected calibration error (BINS equal-width bins of confidence), Brier score and cross entropy.
+    """Expected calibration error, Brier score and cross entropy.
 
+    The calibration error has BINS bins of confidence of equal width.
     Source: Guo et al., On calibration of modern neural networks, 2017; Brier 1950 (sum over the
     classes).
     """

@@ -22,6 +22,8 @@ from lowalt.targets import cyclist, gait_run, gait_walk, quadruped
 from lowalt.targets.cloud import Cloud
 from lowalt.targets.skeleton import FEET, NODES, forward_kinematics, node_cloud, rotation
 
+STANCE_M = 0.02
+"""A foot within this height of the ground carries the body."""
 HIP_HEIGHT = 0.530
 """Hip (greater trochanter) above ground, in statures.
 
@@ -164,7 +166,7 @@ def stance_speed_mps(
 ) -> float:
     """Return the mean ground speed (m/s) of the lowest foot node while it carries the body.
 
-    A foot carries the body while it is within 2 cm of the ground. `cycle` (F, L, 3) cyclic,
+    A foot carries the body while it is within STANCE_M of the ground. `cycle` (F, L, 3) cyclic,
     `feet` the numbers of the foot nodes, front +y, horizontal progress left out; `speed_mps` is
     added back. A foot that stands still has the speed zero. The ground is the feet's lowest point.
     """
@@ -176,7 +178,7 @@ def stance_speed_mps(
     height = positions[..., 2]
     lowest = height.argmin(axis=1)
     frames = np.arange(len(positions))
-    down = height[frames, lowest] < height.min() + 0.02
+    down = height[frames, lowest] < height.min() + STANCE_M
     speeds = portable.norm(velocity[frames, lowest, :2])
     return float(portable.mean(speeds[down]))
 

@@ -15,6 +15,8 @@ import numpy as np
 from lowalt.files.errors import InputError
 from lowalt.numerics import portable
 
+BOX_EXPONENT = 8.0
+"""Exponent of the superellipse that is a box's section along y."""
 GRAIN = 30
 """Triangles across the border of a cut are divided.
 
@@ -213,10 +215,10 @@ def hull(stations: Iterable[tuple], exponent: float, sides: int = 24, bow: float
 def box(size: Iterable[float], centre: Iterable[float] = (0, 0, 0)) -> Surface:
     """Return a box with the edge lengths `size` (x, y, z).
 
-    The superellipse's exponent rounds its edges along y.
+    BOX_EXPONENT rounds its edges along y.
     """
     x, y, z = (float(value) / 2 for value in size)
-    return hull([(-y, x, -z, z), (y, x, -z, z)], 8.0).moved(centre)
+    return hull([(-y, x, -z, z), (y, x, -z, z)], BOX_EXPONENT).moved(centre)
 
 
 def ring(profile: np.ndarray, sides: int = 32) -> Surface:

@@ -334,6 +334,19 @@ def test_the_field_among_buildings_never_jumps():
     assert largest[1] < 0.2 * largest[0]
 
 
+def test_the_field_is_smooth_across_the_shadow_of_a_roof():
+    wide = built([(0.0, 0.0, 2.0, 4000.0, 26.0)])
+    heights = np.linspace(10, 30, 400)
+    ends = np.stack([np.full(400, 60.0), np.full(400, 3.0), heights], axis=1)[:, None]
+    rays = image_paths.rays_to(ends, 0.0)
+    lit, field = image_paths.direct(wide, MAST, ends, rays, WAVELENGTH_M, True)
+    assert lit.any()
+    assert not lit.all()
+    assert abs(np.diff(field[:, 0])).max() < 0.1
+    assert abs(field[0, 0]) < 0.2
+    assert field[-1, 0] == 1.0
+
+
 def test_an_upright_edge_diffracts_on_both_sides_of_its_shadow_and_by_a_wall_that_goes_on_past_the_target():
     wall = built([(0.0, 1000.0, 0.02, 2000.0, 9000.0)])
     mast = np.array([-200.0, 5.0, 30.0])

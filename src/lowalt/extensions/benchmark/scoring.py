@@ -23,6 +23,9 @@ from lowalt.recognition.predictions import Predictions
 from lowalt.recognition.samples import Facts
 from lowalt.recognition.statistics import accuracy_by, f1_by_snr
 
+ACCEPTED = 0.95
+"""Share of the samples of trained classes that the track open-set accepts."""
+
 
 class Values(NamedTuple):
     """One value per motion model and training seed, (seeds, models), with weights and subtypes.
@@ -118,12 +121,12 @@ def headline(track: Track, found: Values) -> Interval:
 def rejected_share(part: Predictions, label: int) -> float:
     """Return the share of the held-out class that is rejected.
 
-    The threshold accepts 95 % of the samples of trained classes. label: of the
-    held-out class.
+    The threshold accepts the share ACCEPTED of the samples of trained classes.
+    label: that of the held-out class.
     """
     scores = part.probabilities[:, label]
     held_out = part.label == label
-    return float(np.mean(scores[held_out] > np.quantile(scores[~held_out], 0.95)))
+    return float(np.mean(scores[held_out] > np.quantile(scores[~held_out], ACCEPTED)))
 
 
 def scores(track: Track, answers: list[np.ndarray], baselines: dict[str, np.ndarray]) -> dict:

@@ -25,6 +25,7 @@ from lowalt.recognition.samples import Samples
 
 LARGEST_BYTES = 1_000_000
 BATCH = 64
+"""Samples that a network answers at a time."""
 FEWER_POINTS = 0.5
 """An entry that loses more of the validation accuracy, in percentage points, is not written."""
 

@@ -83,9 +83,9 @@ def answers(
     """Return what a network says of every window of a recording.
 
     settings: how the network's images are made of signals (`runs.opened`), with the block `radar`;
-    where: the record's path; images_of: makes them in place of `rendered`, as that
-    does. Raises: InputError where the network knows no recordings, the
-    recording's carrier or channel is not the radar's, or the file cannot be read.
+    where: the record's path; images_of: the function that makes the images, by default `rendered`.
+    Raises: InputError where the network knows no recordings, the recording's carrier or channel is
+    not the radar's, or the file cannot be read.
     """
     known = radars()
     if "radar" not in settings:
@@ -111,8 +111,8 @@ def answers(
     there = ~(found.clipped | found.lost)
     shown = intervals.copy()
     shown[there] = without_hum(intervals[there], twin)
-    images_of = images_of or rendered
-    images = images_of(shown, twin, Images.from_settings(settings["images"]), trained.size)
+    made_by = images_of or rendered
+    images = made_by(shown, twin, Images.from_settings(settings["images"]), trained.size)
     count = len(intervals)
     numbers = np.arange(len(intervals))
     samples = Windows(

@@ -5,6 +5,7 @@ station. Recordings are never trained or validated on.
 """
 
 import hashlib
+from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
 
@@ -60,9 +61,30 @@ def settings(path: str | Path = RECOGNITION, over: dict | None = None) -> dict:
         raise InputError(f"{path}: key {error} is missing") from None
 
 
+Signals = tuple[np.ndarray, list[str]]
+"""Intervals of simulated targets, and the targets' subtypes."""
+
+
+def kept_signals(made_of: str, folder: Path | None, make: Callable[[], Signals]) -> Signals:
+    """Return what `make` returns, out of a folder that an earlier call has kept it in.
+
+    made_of: everything that the signals depend on; folder: None keeps nothing.
+    """
+    if folder is None:
+        return make()
+    path = folder / f"{hashlib.sha256(made_of.encode()).hexdigest()[:16]}.npz"
+    if path.is_file():
+        with np.load(path, allow_pickle=False) as data:
+            return data["intervals"], data["subtypes"].tolist()
+    intervals, subtypes = make()
+    with replacing(path) as temporary, temporary.open("wb") as file:
+        np.savez(file, intervals=intervals, subtypes=np.array(subtypes))
+    return intervals, subtypes
+
+
 def _intervals(
     library: Library, name: str, category: str, block: dict, fold: str, kept: Path | None
-) -> tuple:
+) -> Signals:
     """The intervals of a category for a fold, and their subtypes; out of the folder `kept` where it
     has them.
     """
@@ -78,18 +100,13 @@ def _intervals(
         name=name,
         category=category,
     )
-    path = (
-        None if kept is None else kept / f"{hashlib.sha256(made_of.encode()).hexdigest()[:16]}.npz"
-    )
-    if path is not None and path.is_file():
-        with np.load(path, allow_pickle=False) as data:
-            return data["intervals"], data["subtypes"].tolist()
-    intervals, subtypes = library.simulated(name, category, count, fold, receivers)
-    intervals = intervals.astype(np.complex64)
-    if path is not None:
-        with replacing(path) as temporary, temporary.open("wb") as file:
-            np.savez(file, intervals=intervals, subtypes=np.array(subtypes))
-    return intervals, subtypes
+
+    def made() -> Signals:
+        """Simulate the intervals."""
+        intervals, subtypes = library.simulated(name, category, count, fold, receivers)
+        return intervals.astype(np.complex64), subtypes
+
+    return kept_signals(made_of, kept, made)
 
 
 def simulated(

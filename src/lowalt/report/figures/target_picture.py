@@ -31,6 +31,7 @@ GREY = (0.55, 0.55, 0.58, 1.0)
 FLOOR_DB = -40.0
 CONFIG = SHIPPED / "config/default.yaml"
 SEED = 1
+"""Of the motion model that is shown."""
 
 
 def _colours(cloud: Cloud) -> np.ndarray:
