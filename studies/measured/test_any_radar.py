@@ -62,6 +62,8 @@ def test_drawn_radars_lie_in_their_ranges_and_none_is_a_measured_one():
     for twin in drawn:
         assert Twin.from_settings(vars(twin)) == twin
         assert 0.15 < twin.symbols * twin.symbol_interval_s < 0.61
+        one_sided = twin.sampling == "one_sided"
+        assert 4.99 < twin.edge_mps * (2 if one_sided else 1) < 60.01
         assert not any(alike(twin, other, block["apart"]) for other in measured)
     assert {(twin.channel, twin.sampling) for twin in drawn} == {
         (channel, one) for channel, of in block["samplings"].items() for one in of
@@ -73,8 +75,18 @@ def test_drawn_radars_lie_in_their_ranges_and_none_is_a_measured_one():
     assert alike(first, near, block["apart"]) and not alike(again, near, block["apart"])
 
 
-def test_the_table_has_each_labelled_recording_next_to_the_radar_s_own_network(tmp_path):
+def test_the_table_has_each_labelled_recording_next_to_the_radar_s_own_network(
+    tmp_path, monkeypatch
+):
     """Networks of two steps: what they say is of no use, where it stands is."""
+    images = []
+
+    def noted(*given):
+        """Make images and note of how many intervals."""
+        images.append(len(given[0]))
+        return rendered(*given)
+
+    monkeypatch.setattr(any_radar, "rendered", noted)
     folder = tmp_path / "inputs/walker_24ghz"
     folder.mkdir(parents=True)
     rate = 6000
@@ -103,6 +115,8 @@ def test_the_table_has_each_labelled_recording_next_to_the_radar_s_own_network(t
         (radar, "tuning", "Pedestrian") for radar in ("cw_24ghz", "any")
     ]
     assert {row["windows"] for row in rows} == {"12"}
+    # Three folds have an interval of each class; then both networks are asked about the recording.
+    assert images == [4, 4, 4, 4, 12, 12]
     kept = read_csv("results/reference/measured-accuracy.csv")
     own = [row for row in kept if (row["radar"], row["half"]) == ("cw_24ghz", "tuning")]
     of_class = next(row for row in own if row["class"] == "Pedestrian")
