@@ -79,16 +79,16 @@ def train(
     trainer = Trainer(model, samples, scheme.columns, {**settings, "training": block}, run, machine)
     resumed = trainer.resume()
     machine.agree(identity, trainer.at.steps)
-    if resumed and not machine.rank:
+    if resumed and machine.rank == 0:
         print(f"{folder}: resumed at step {trainer.at.steps}", file=sys.stderr)
-    if events and not machine.rank:
+    if events and machine.rank == 0:
         trainer.metrics = tensorboard(folder / "events", trainer.at.steps)
     first = trainer.at.steps
     began = time.monotonic()
-    busy = time.process_time()
+    processor_began = time.process_time()
     trainer.fit()
     seconds = time.monotonic() - began
-    busy = time.process_time() - busy
+    processor_s = time.process_time() - processor_began
     about = {
         "protocol": protocol,
         "size": settings["size"],
@@ -103,7 +103,7 @@ def train(
             "colour_map": settings["colour_map"],
         }
     )
-    if machine.rank:
+    if machine.rank != 0:
         return
     _record(
         folder / "run.json",
@@ -115,15 +115,16 @@ def train(
             "weights": settings["network"]["weights"],
             "parameters": recogniser.parameters(model),
             "resumed": resumed,
-            "train_processor_s": busy,
+            "train_processor_s": processor_s,
         },
     )
 
 
 def _spent(trainer: Trainer, first: int, seconds: float) -> dict:
-    """What a training that began at step `first` did in this time, and on which machine."""
+    """What a training has done from step `first` on, in this many seconds, and its machine."""
     at = trainer.at
     batch = trainer.block["batch"]
+    # A training that was resumed after its last step takes no time.
     time_s = max(seconds, 1e-9)
     return {
         "hardware": describe(),

@@ -62,13 +62,13 @@ class Mesh(Surface):
 def joined(meshes: list[Mesh]) -> Mesh:
     """Return several meshes as one, components numbered on."""
     whole = merged(meshes)
-    components = []
+    numbers = []
     first = 0
     for mesh in meshes:
-        components.append(mesh.component + first)
+        numbers.append(mesh.component + first)
         first += len(mesh.closed)
     closed = np.concatenate([mesh.closed for mesh in meshes])
-    return Mesh(whole.vertices, whole.faces, np.concatenate(components), closed)
+    return Mesh(whole.vertices, whole.faces, np.concatenate(numbers), closed)
 
 
 def metres(unit: str | float) -> float:
