@@ -44,6 +44,7 @@ PROGRAMS = {
         "import sys, lowalt.echo.__main__, lowalt.noise.__main__; print('lowalt.scene' in"
         " sys.modules)"
     ),
+    "no cubes": "import sys, lowalt.shards.__main__; print('lowalt.tiles.cubes' in sys.modules)",
     "scenes": (
         "import os, sys, lowalt.echo.__main__, lowalt.scene.__main__, lowalt.noise.__main__\n"
         "from lowalt.scene.effects import called\n"
@@ -80,8 +81,8 @@ def test_what_no_scene_names_is_not_imported(said):
     assert found == [set(scene) for scene in SCENES]
 
 
-def test_a_run_without_effects_imports_nothing_of_them(said):
-    assert said["plain"] == "False\n"
+def test_a_run_without_effects_and_shards_without_cubes_import_nothing_of_them(said):
+    assert said["plain"] == said["no cubes"] == "False\n"
 
 
 def test_the_plan_of_the_package_names_every_room():
