@@ -9,7 +9,7 @@ UNSEEN = ("nio-et5t-2023", "walking-pedestrian-5")
 OVERLAY = {
     "run": "test",
     "targets": {"select": ["Crow", "NIO ET5T 2023", "DJI Mini 2", "Walking Pedestrian 5"]},
-    "motion": {"models": 20, "models_per_chunk": 10},
+    "motion": {"models": 10, "models_per_chunk": 10},
     "noise": {"snr_db": [8, float("inf")]},
 }
 # The region is given, so that it does not follow from the stations.
@@ -21,7 +21,7 @@ MESH = "meshes/uav/crazyflie_cf2_assembly.stl"
 
 # --- the model: which jobs follow from which ---
 
-PARTS = ("00000", "00001")
+PARTS = ("00000",)
 STATIONS = ("A", "B", "C")
 FOLDS = ("train", "val", "test")
 GROUPS = {"seen": SEEN, "unseen": UNSEEN}
