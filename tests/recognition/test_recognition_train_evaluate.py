@@ -15,7 +15,7 @@ import model_files
 from lowalt.config.layers import merge
 from lowalt.files.errors import InputError
 from lowalt.files.yaml_files import load_yaml
-from lowalt.recognition import runs, score
+from lowalt.recognition import named_models, runs, score
 from lowalt.recognition.__main__ import main
 from lowalt.recognition.inference import Machine
 from lowalt.recognition.sample_sources import Source
@@ -124,7 +124,7 @@ def test_a_folder_that_is_no_run_and_a_setting_that_is_none_are_refused(run, tmp
 
 def test_a_name_where_no_extension_brings_models_is_no_choice_among_none(monkeypatch):
     monkeypatch.setattr(named_models, "offered", lambda kind: {})
-    with pytest.raises(InputError, match="'default-seen': not a file, expected one$"):
+    with pytest.raises(InputError, match=r"not a file, expected one$"):
         named_models.path_of("default-seen")
 
 

@@ -18,6 +18,7 @@ def parsed_only(monkeypatch, words):
     whole = argparse.ArgumentParser.parse_args
 
     def stop(self, *given):
+        """Parse, and go no further."""
         whole(self, *given)
         raise KeyError("understood")
 
