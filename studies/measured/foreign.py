@@ -14,6 +14,7 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
+import h5py
 import numpy as np
 from accuracy import COUNTED
 
@@ -74,11 +75,25 @@ def inputs_of(twin: Twin, recorded: Path, folder: Path) -> Iterator[tuple[str, R
         np.save(folder / "samples.npy", values if twin.channel == "complex" else values.real)
         yield name, record({"file": "samples.npy", **about}, folder, name)
     for block in load_yaml(RECORDS, "records")["records"]:
-        name = block["what"]
-        yield (
-            name,
-            record({key: value for key, value in block.items() if key != "what"}, recorded, name),
-        )
+        name = block.pop("what")
+        distance = block.pop("distance", None)
+        if distance is None:
+            yield name, record(block, recorded, name)
+            continue
+        np.save(folder / "samples.npy", sweeps(recorded / block["file"], distance))
+        yield name, record({**block, "file": "samples.npy"}, folder, name)
+
+
+def sweeps(path: Path, distance: int) -> np.ndarray:
+    """Return the samples (n,) complex128 at one distance out of the frames (frames, sweeps,
+    distances) of a file of acconeer's exploration tool whose sensor paused between no frames.
+
+    Source: the tool's documentation, continuous sweep mode.
+    """
+    with h5py.File(path) as file:
+        frames = file["sessions/session_0/group_0/entry_0/result/frame"][()]
+    at_distance = frames[:, :, distance].ravel()
+    return at_distance["real"] + 1j * at_distance["imag"]
 
 
 def row(network: str, name: str, said: Answers | None, classes: list[str]) -> list:
