@@ -63,6 +63,12 @@ def inputs_of(twin: Twin, recorded: Path, folder: Path) -> Iterator[tuple[str, R
     """Yield the name and record of each input of a radar; recorded: folder of the recordings;
     folder: for samples.
     """
+    yield from simulated_inputs(twin, folder)
+    yield from recorded_inputs(recorded, folder)
+
+
+def simulated_inputs(twin: Twin, folder: Path) -> Iterator[tuple[str, Record]]:
+    """Yield the name and record of each simulated input of a radar; folder: for samples."""
     count = round(SECONDS * twin.rate_hz)
     simulated = {
         "white noise": lambda rng: noise(count, rng),
@@ -74,8 +80,15 @@ def inputs_of(twin: Twin, recorded: Path, folder: Path) -> Iterator[tuple[str, R
         values = made(stream(SEED, "foreign", name, int(twin.carrier_hz)))
         np.save(folder / "samples.npy", values if twin.channel == "complex" else values.real)
         yield name, record({"file": "samples.npy", **about}, folder, name)
+
+
+def recorded_inputs(recorded: Path, folder: Path) -> Iterator[tuple[str, Record]]:
+    """Yield the name and record of each recorded input that is there; arguments: as `inputs_of`."""
     for block in load_yaml(RECORDS, "records")["records"]:
         name = block.pop("what")
+        if not (recorded / block["file"]).is_file():
+            print(f"{name}: {block['file']} is not there, left out")
+            continue
         distance = block.pop("distance", None)
         if distance is None:
             yield name, record(block, recorded, name)
