@@ -15,6 +15,7 @@ of the same files. The rows of radar "any" hold all radars that have an own netw
 
 import argparse
 import math
+import tempfile
 from dataclasses import asdict, dataclass
 from functools import lru_cache
 from itertools import pairwise
@@ -32,19 +33,24 @@ from accuracy import (
     said_of,
     window_s,
 )
+from any_speed import RADAR, any_speed
+from foreign import recorded_inputs, simulated_inputs
 from fourth_radar import RECORDS as FOURTH
-from labels import intervals_of, read_labels
+from labels import intervals_of, label_of, read_labels
 from measured_tables import write_measured
 from recorded_sets import Measured, recordings, usable
+from refused import FOREIGN, REFUSED, Asked, over_seeds, refusals, simulated_names
 from torch import nn
 
 from lowalt.config.classes import CATEGORIES
 from lowalt.config.command import run
 from lowalt.config.network import SPEED_OF_LIGHT
-from lowalt.extensions.recordings.answers import answers
+from lowalt.extensions.recordings.answers import Answers, answers
+from lowalt.extensions.recordings.files import read
 from lowalt.extensions.recordings.presence import speeds_shown
-from lowalt.extensions.recordings.record import record
-from lowalt.extensions.recordings.twin import Twin, twin_of
+from lowalt.extensions.recordings.record import Record, record
+from lowalt.extensions.recordings.twin import NO_CLASS, Twin, twin_of
+from lowalt.extensions.recordings.twin_others import KINDS
 from lowalt.extensions.recordings.twin_scenes import SCENES, Library, clouds_of, intervals
 from lowalt.extensions.recordings.twin_training import kept_signals, settings, train
 from lowalt.extensions.recordings.window_samples import Windows, facts
@@ -55,6 +61,7 @@ from lowalt.machine.progress import reported
 from lowalt.numerics.streams import stream
 from lowalt.recognition.checkpoint import identity
 from lowalt.recognition.inference import Machine, probabilities
+from lowalt.recognition.runs import Trained
 from lowalt.tiles.image_settings import Images
 from lowalt.tiles.scale import Scale
 
@@ -62,6 +69,11 @@ SETTINGS = Path(__file__).with_name("any_radar.yaml")
 REFERENCE = Path("results/reference")
 NAME = "any"
 """Name of the network, and of the rows of all radars together."""
+REFUSING = "refusing"
+"""Name of the network that knows a fifth class."""
+USUAL = "usual"
+ANY_SPEED = "any speed"
+"""Names of sets of scenes; that of a third is `NO_CLASS`."""
 HB100 = "hb100"
 """Name of the radar of `fourth_radar.yaml`."""
 OWN = ("right_percent", "low", "high", "devices_low", "devices_high", "named_percent")
@@ -193,87 +205,114 @@ def rendered(
 
 
 class Drawing:
-    """What simulated radars are drawn from: the settings, the measured radars, scenes and clouds."""
+    """What simulated radars are drawn from: the settings, the measured radars, scenes and clouds.
+
+    scenes: by the name of the set, then by class.
+    """
 
     def __init__(self, block: dict, library: Library, measured: list[Twin]) -> None:
-        """Read the usual scenes and make the clouds of their targets."""
+        """Read the scenes and make the clouds of their targets."""
         self.block = block
         self.measured = measured
         usual = load_yaml(shipped(SCENES), "usual scenes")
         self.seed = int(usual["seed"])
+        at_any_speed = any_speed()[0][RADAR]["scenes"]
+        receiver = {"receiver": block["receiver"]}
         self.scenes = {
-            label: [{**scene, "receiver": block["receiver"]} for scene in usual["scenes"][label]]
-            for label in CATEGORIES
+            USUAL: {
+                label: [{**one, **receiver} for one in usual["scenes"][label]]
+                for label in CATEGORIES
+            },
+            ANY_SPEED: {
+                label: [{**one, **receiver} for one in at_any_speed[label]] for label in CATEGORIES
+            },
+            NO_CLASS: {NO_CLASS: [{"others": list(KINDS), **receiver}]},
         }
-        names = {
-            name
-            for of_class in self.scenes.values()
+        every = [
+            scene
+            for of_set in self.scenes.values()
+            for of_class in of_set.values()
             for scene in of_class
-            for name in scene["subtypes"]
-        }
+        ]
+        every += [scene["second"]["scene"] for scene in every if "scene" in scene.get("second", {})]
+        names = {name for scene in every for name in scene.get("subtypes", ())}
         self.clouds = clouds_of(library.records, sorted(names), self.seed)
 
     def twin(self, fold: str, number: int) -> Twin:
         """Return the radar `number` of a fold."""
         return drawn_twin(self.block, self.measured, stream(self.seed, "any-radar", fold, number))
 
-    def windows(self, fold: str, number: int) -> tuple[np.ndarray, list[str]]:
-        """Return the intervals (classes, echoes, receivers, symbols) complex64 of a radar, and the
-        subtypes (classes echoes) of its targets."""
+    def windows(self, fold: str, number: int, which: str) -> tuple[np.ndarray, list[str]]:
+        """Return the intervals (classes, echoes, receivers, symbols) complex64 of a radar in front
+        of a set of scenes, and the subtypes (classes echoes) of its targets."""
         twin = self.twin(fold, number)
-        echoes = self.block["echoes"]
+        echoes = self.block["echoes"][which]
         receivers = self.block["receivers"]
-        result = np.empty((len(CATEGORIES), echoes, receivers, twin.symbols), np.complex64)
+        of_set = () if which == USUAL else (which,)
+        result = np.empty((len(self.scenes[which]), echoes, receivers, twin.symbols), np.complex64)
         subtypes = []
-        for label, category in enumerate(CATEGORIES):
-            scenes = self.scenes[category]
+        for place, (label, scenes) in enumerate(self.scenes[which].items()):
             for echo in range(echoes):
                 scene = scenes[(number * echoes + echo) % len(scenes)]
-                keys = ("any-radar", fold, number, category, echo)
+                keys = ("any-radar", *of_set, fold, number, label, echo)
                 found, names = intervals(twin, scene, self.clouds, self.seed, keys, 1, receivers)
-                result[label, echo] = found[0]
+                result[place, echo] = found[0]
                 subtypes += names
         return result, subtypes
 
-    def kept(self, fold: str, number: int, folder: Path) -> tuple[np.ndarray, list[str]]:
+    def kept(
+        self, fold: str, number: int, which: str, folder: Path
+    ) -> tuple[np.ndarray, list[str]]:
         """Return what `windows` does, out of the folder where an earlier run left it there."""
         made_of = identity(
             twin=asdict(self.twin(fold, number)),
-            echoes=self.block["echoes"],
+            echoes=self.block["echoes"][which],
             receivers=self.block["receivers"],
-            scenes=self.scenes,
+            scenes=self.scenes[which],
             seed=self.seed,
             fold=fold,
             number=number,
         )
-        return kept_signals(made_of, folder, lambda: self.windows(fold, number))
+        return kept_signals(made_of, folder, lambda: self.windows(fold, number, which))
 
 
-def samples(drawing: Drawing, fold: str, views: list[View], size: int, folder: Path) -> Windows:
-    """Return the images of a fold's radars as samples; folder: keeps their signals."""
+def samples(
+    drawing: Drawing, fold: str, sets: list[str], views: list[View], size: int, folder: Path
+) -> Windows:
+    """Return the images of a fold's radars in front of sets of scenes as samples; folder: keeps
+    their signals."""
     block = drawing.block
+    classes = classes_of(sets)
     images = []
     labels = []
     names: list[str] = []
     radars = block["radars"][fold]
-    for number in reported(range(radars), radars, "radars"):
-        twin = drawing.twin(fold, number)
-        found, subtypes = drawing.kept(fold, number, folder)
-        every = found.reshape(-1, twin.symbols)
-        images.append(rendered(every, twin, views, block["floor_db"], size))
-        labels.append(np.repeat(np.arange(len(CATEGORIES)), every.shape[0] // len(CATEGORIES)))
-        names += subtypes
+    for which in sets:
+        of_set = drawing.scenes[which]
+        for number in reported(range(radars), radars, "radars"):
+            twin = drawing.twin(fold, number)
+            found, subtypes = drawing.kept(fold, number, which, folder)
+            every = found.reshape(-1, twin.symbols)
+            images.append(rendered(every, twin, views, block["floor_db"], size))
+            for label in of_set:
+                labels += [classes.index(label)] * (len(every) // len(of_set))
+            names += subtypes
     receivers = block["receivers"]
     return Windows(
         np.concatenate(images),
         facts(
-            np.concatenate(labels),
+            np.array(labels),
             np.repeat(names, receivers).tolist(),
             np.repeat(np.arange(len(names)), receivers),
             np.tile(np.arange(receivers, dtype=float), len(names)),
             fold,
         ),
     )
+
+
+def classes_of(sets: list[str]) -> tuple[str, ...]:
+    """Return the classes of a network that learns from sets of scenes."""
+    return (*CATEGORIES, NO_CLASS) if NO_CLASS in sets else tuple(CATEGORIES)
 
 
 def asked(
@@ -301,22 +340,26 @@ def fourth_twin(inputs: Path) -> Twin:
     return twin_of(record(first, inputs, first["file"]), float(first["rate_hz"]))
 
 
-def rows_of(
-    model: Path, seed: int, recordings: list[tuple[str, Twin, Measured]], block: dict
-) -> list[list]:
-    """Return the rows of `RECOGNITION` of what the network in a file says of recordings."""
-    trained = loaded(model, NAME)
+def answered(trained: Trained, about: Record, name: str, twin: Twin, block: dict) -> Answers:
+    """Return what a network for any radar says of a recording in front of a radar."""
     views = views_of(block)
-    labels = read_labels()
 
     def images_of(intervals: np.ndarray, twin: Twin, _: Images, size: int) -> np.ndarray:
         """The images of intervals of any radar."""
         return rendered(intervals, twin, views, block["floor_db"], size)
 
+    made_with = {"radar": asdict(twin), "images": block["recognition"]["images"]}
+    return answers(trained, made_with, about, name, images_of)
+
+
+def rows_of(
+    trained: Trained, seed: int, recordings: list[tuple[str, Twin, Measured]], block: dict
+) -> list[list]:
+    """Return the rows of `RECOGNITION` of what a network says of recordings."""
+    labels = read_labels()
     result = []
     for name, twin, recording in recordings:
-        made_with = {"radar": asdict(twin), "images": block["recognition"]["images"]}
-        found = answers(trained, made_with, record_of(recording), recording.name, images_of)
+        found = answered(trained, record_of(recording), recording.name, twin, block)
         stretches = intervals_of(labels, recording.set, recording.name, recording.record.label)
         said = said_of(found, list(trained.classes), window_s(twin), stretches)
         about = recording.device, recording.set, recording.half, recording.name
@@ -327,17 +370,86 @@ def rows_of(
     return result
 
 
+def answers_of(
+    trained: Trained,
+    recordings: list[tuple[str, Twin, Measured]],
+    measured: dict[str, Twin],
+    inputs: Path,
+    block: dict,
+) -> list[Asked]:
+    """Return what a network says of labelled recordings and of what belongs to no class; measured:
+    the radars by name; inputs: folder of the recordings."""
+    intervals_by_file = read_labels()
+    result = []
+    for radar, twin, one in recordings:
+        found = answered(trained, record_of(one), one.name, twin, block)
+        stretches = intervals_of(intervals_by_file, one.set, one.name, one.record.label)
+        labels = [label_of(start_s, window_s(twin), stretches) for start_s in found.starts_s]
+        result.append(Asked(radar, one.half, [label or "" for label in labels], found))
+
+    def asked_of_none(radar: str, twin: Twin, name: str, about: Record) -> Asked:
+        """What the network says of an input of no class."""
+        found = answered(trained, about, name, twin, block)
+        return Asked(radar, FOREIGN, [name] * len(found.starts_s), found)
+
+    with tempfile.TemporaryDirectory() as folder:
+        for radar, twin in measured.items():
+            for name, about in simulated_inputs(twin, Path(folder)):
+                result.append(asked_of_none(radar, twin, name, about))
+        for name, about in recorded_inputs(inputs, Path(folder)):
+            # A labelled one is of a class: a car in front of another radar.
+            if about.label:
+                continue
+            near = [radar for radar, twin in measured.items() if twin.near(about.carrier_hz)]
+            if near:
+                radar = near[0]
+                twin = measured[radar]
+            else:
+                radar = f"{about.carrier_hz / 1e9:g} GHz"
+                twin = twin_of(about, read(about).rate_hz)
+            result.append(asked_of_none(radar, twin, name, about))
+    return result
+
+
 def simulated_rows(network: nn.Module, windows: Windows, seed: int) -> list[list]:
     """Return the rows of `SIMULATED` of a network on the windows of radars that it did not learn."""
-    count = len(windows.images)
-    shares = probabilities(network, windows, np.arange(count), Machine.here("fp32"), 64)
-    named = shares.argmax(axis=1)
+    named = shares_of(network, windows).argmax(axis=1)
     result = []
     for label, category in enumerate(CATEGORIES):
         of_class = windows.facts.label == label
         right_percent = 100 * float((named[of_class] == label).mean())
         result.append([seed, category, int(of_class.sum()), right_percent])
     return result
+
+
+def shares_of(network: nn.Module, windows: Windows) -> np.ndarray:
+    """Return the probabilities (n, classes) of a network for simulated windows."""
+    return probabilities(network, windows, np.arange(len(windows.facts)), Machine.here("fp32"), 64)
+
+
+def folds_of(drawing: Drawing, name: str, models: Path) -> dict[str, Windows]:
+    """Return what a network learns from, and simulated windows to test it on, by fold."""
+    block = drawing.block
+    sets = block["networks"][name]["scenes"]
+    size = block["recognition"]["size"]
+    return {
+        fold: samples(drawing, fold, sets, views_of(block), size, models / "signals")
+        for fold in ("train", "validation", "test")
+    }
+
+
+def learned(block: dict, folds: dict[str, Windows], name: str, seed: int, models: Path) -> Trained:
+    """Train a network of the settings and return it."""
+    learns = block["networks"][name]
+    recognition = block["recognition"]
+    recognition = {
+        **recognition,
+        "training": {**recognition["training"], "steps": learns["steps"]},
+    }
+    windows = {fold: folds[fold] for fold in ("train", "validation")}
+    folder = models / f"{name}-{seed}"
+    train(recognition, windows, name, seed, folder, classes_of(learns["scenes"]))
+    return loaded(folder / "model.safetensors", name)
 
 
 def views_of(block: dict) -> list[View]:
@@ -387,28 +499,34 @@ def main(arguments: list[str]) -> None:
     block = load_yaml(options.settings, "settings of any radar")
     block["recognition"] = settings(over=block["recognition"])
     library = Library.read()
-    measured = [*library.twins.values(), fourth_twin(options.inputs)]
-    drawing = Drawing(block, library, measured)
-    size = block["recognition"]["size"]
-    kept = options.models / "signals"
-    folds = {
-        fold: samples(drawing, fold, views_of(block), size, kept)
-        for fold in ("train", "validation", "test")
-    }
+    measured = {**library.twins, HB100: fourth_twin(options.inputs)}
+    drawing = Drawing(block, library, list(measured.values()))
     inputs = asked(block, library, options.inputs, options.half)
+    seeds = block["recognition"]["seeds"]
+
     rows = []
     simulated = []
-    for seed in block["recognition"]["seeds"]:
-        folder = options.models / f"{NAME}-{seed}"
-        learned = {fold: folds[fold] for fold in ("train", "validation")}
-        network = train(block["recognition"], learned, NAME, seed, folder)
-        simulated += simulated_rows(network, folds["test"], seed)
-        rows += rows_of(folder / "model.safetensors", seed, inputs, block)
+    folds = folds_of(drawing, NAME, options.models)
+    for seed in seeds:
+        trained = learned(block, folds, NAME, seed, options.models)
+        simulated += simulated_rows(trained.model, folds["test"], seed)
+        rows += rows_of(trained, seed, inputs, block)
     own = own_rows(REFERENCE / "measured-recognition.csv")
     table = compared(rows, own, block["recognition"]["seed"])
     write_measured(options.out, "any-radar", COLUMNS, table)
     write_measured(options.out, "any-radar-files", RECOGNITION, rows)
     write_measured(options.out, "any-radar-simulated", SIMULATED, simulated)
+
+    folds = folds_of(drawing, REFUSING, options.models)
+    of_seeds = []
+    for seed in seeds:
+        trained = learned(block, folds, REFUSING, seed, options.models)
+        known = folds["validation"].facts.label < len(CATEGORIES)
+        shares = shares_of(trained.model, folds["validation"])[known]
+        on_test = shares_of(trained.model, folds["test"]), simulated_names(folds["test"].facts)
+        said = answers_of(trained, inputs, measured, options.inputs, block)
+        of_seeds.append(refusals(shares, on_test, said, block["kept_percent"]))
+    write_measured(options.out, "refused", REFUSED, over_seeds(of_seeds))
 
 
 if __name__ == "__main__":

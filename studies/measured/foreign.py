@@ -14,6 +14,7 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
+import h5py
 import numpy as np
 from accuracy import COUNTED
 
@@ -62,6 +63,12 @@ def inputs_of(twin: Twin, recorded: Path, folder: Path) -> Iterator[tuple[str, R
     """Yield the name and record of each input of a radar; recorded: folder of the recordings;
     folder: for samples.
     """
+    yield from simulated_inputs(twin, folder)
+    yield from recorded_inputs(recorded, folder)
+
+
+def simulated_inputs(twin: Twin, folder: Path) -> Iterator[tuple[str, Record]]:
+    """Yield the name and record of each simulated input of a radar; folder: for samples."""
     count = round(SECONDS * twin.rate_hz)
     simulated = {
         "white noise": lambda rng: noise(count, rng),
@@ -73,12 +80,33 @@ def inputs_of(twin: Twin, recorded: Path, folder: Path) -> Iterator[tuple[str, R
         values = made(stream(SEED, "foreign", name, int(twin.carrier_hz)))
         np.save(folder / "samples.npy", values if twin.channel == "complex" else values.real)
         yield name, record({"file": "samples.npy", **about}, folder, name)
+
+
+def recorded_inputs(recorded: Path, folder: Path) -> Iterator[tuple[str, Record]]:
+    """Yield the name and record of each recorded input that is there; arguments: as `inputs_of`."""
     for block in load_yaml(RECORDS, "records")["records"]:
-        name = block["what"]
-        yield (
-            name,
-            record({key: value for key, value in block.items() if key != "what"}, recorded, name),
-        )
+        name = block.pop("what")
+        if not (recorded / block["file"]).is_file():
+            print(f"{name}: {block['file']} is not there, left out")
+            continue
+        distance = block.pop("distance", None)
+        if distance is None:
+            yield name, record(block, recorded, name)
+            continue
+        np.save(folder / "samples.npy", sweeps(recorded / block["file"], distance))
+        yield name, record({**block, "file": "samples.npy"}, folder, name)
+
+
+def sweeps(path: Path, distance: int) -> np.ndarray:
+    """Return the samples (n,) complex128 at one distance out of the frames (frames, sweeps,
+    distances) of a file of acconeer's exploration tool whose sensor paused between no frames.
+
+    Source: the tool's documentation, continuous sweep mode.
+    """
+    with h5py.File(path) as file:
+        frames = file["sessions/session_0/group_0/entry_0/result/frame"][()]
+    at_distance = frames[:, :, distance].ravel()
+    return at_distance["real"] + 1j * at_distance["imag"]
 
 
 def row(network: str, name: str, said: Answers | None, classes: list[str]) -> list:

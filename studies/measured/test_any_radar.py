@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 import yaml
 from any_radar import View, alike, drawn_twin, image, own_rows, rendered
+from refused import REFUSED, Asked, leaning_for, leant, over_seeds, refusals
 from scipy.io import wavfile
 
 from lowalt.config.network import SPEED_OF_LIGHT
+from lowalt.extensions.recordings.answers import Answers
 from lowalt.extensions.recordings.twin import Twin, radars
 from lowalt.files.csv_tables import read_csv
 from lowalt.files.yaml_files import load_yaml
@@ -101,11 +103,14 @@ def test_the_table_has_each_labelled_recording_next_to_the_radar_s_own_network(
     tone = (20000 * (0.2 * wave + 0.01 * noise)).astype(np.int16)
     wavfile.write(folder / "PCM2900_Best_Walking_Data.wav", rate, tone)
     block = load_yaml(any_radar.SETTINGS)
-    block |= {"radars": {"train": 2, "validation": 1, "test": 1}, "echoes": 1, "receivers": 1}
+    block |= {"radars": {"train": 2, "validation": 1, "test": 1}, "receivers": 1}
+    block["echoes"] = {"usual": 1, "any speed": 1, "none of these": 2}
+    for network in block["networks"].values():
+        network["steps"] = 2
     block |= {"carrier_hz": [8e9, 10e9], "fastest_mps": [8.0, 9.0], "symbols": [200, 500]}
     block["recognition"] |= {
         "seeds": [0, 1],
-        "training": {"steps": 2, "batch": 4, "validate_every": 1},
+        "training": {"batch": 4, "validate_every": 1},
     }
     (tmp_path / "settings.yaml").write_text(yaml.safe_dump(block))
     options = {
@@ -121,7 +126,9 @@ def test_the_table_has_each_labelled_recording_next_to_the_radar_s_own_network(
     ]
     assert {row["windows"] for row in rows} == {"12"}
     # Three folds have an interval of each class; then both networks are asked about the recording.
-    assert images == [4, 4, 4, 4, 12, 12]
+    assert images[:6] == [4, 4, 4, 4, 12, 12]
+    # The network that refuses learns from two sets of scenes, and from two echoes of no class.
+    assert images[6:18] == [4, 4, 4, 4, 2, 2, 4, 4, 2, 4, 4, 2]
     kept = read_csv("results/reference/measured-accuracy.csv")
     own = [row for row in kept if (row["radar"], row["half"]) == ("cw_24ghz", "tuning")]
     of_class = next(row for row in own if row["class"] == "Pedestrian")
@@ -130,3 +137,42 @@ def test_the_table_has_each_labelled_recording_next_to_the_radar_s_own_network(
         assert float(rows[0][f"own_{key}"]) == pytest.approx(float(of_class[key]), rel=1e-4)
     simulated = read_csv(tmp_path / "out/measured-any-radar-simulated.csv", *any_radar.SIMULATED)
     assert len(simulated) == 8 and {row["windows"] for row in simulated} == {"1"}
+    refused = read_csv(tmp_path / "out/measured-refused.csv", *REFUSED)
+    assert {float(row["kept_percent"]) for row in refused} == {99.0, 95.0, 90.0, 80.0}
+    walks = [row for row in refused if row["half"] == "tuning"]
+    assert {(row["radar"], row["what"], row["windows"]) for row in walks} == {
+        ("cw_24ghz", "Pedestrian", "12")
+    }
+    foreign = {row["radar"] for row in refused if row["half"] == "foreign"}
+    assert foreign == {*radars(), "hb100"}
+
+
+def test_a_share_of_the_known_windows_is_kept_whatever_the_network_says_of_them():
+    rng = np.random.default_rng(0)
+    shares = rng.dirichlet(np.ones(5), 1000)
+    for kept_percent in (50.0, 90.0, 95.0):
+        leaning = leaning_for(shares, kept_percent)
+        said = leant(shares, leaning)
+        assert 100 * (said.argmax(axis=1) < 4).mean() == pytest.approx(kept_percent, abs=0.2)
+        np.testing.assert_allclose(said.sum(axis=1), 1)
+        # The constant does not change which known class is the most probable.
+        np.testing.assert_array_equal(said[:, :4].argmax(axis=1), shares[:, :4].argmax(axis=1))
+
+
+def test_windows_count_as_named_where_they_get_a_known_class():
+    """A recording of four windows: a bird, a walker that is refused, a hand that is named, noise."""
+    shares = np.eye(5)[[1, 4, 0, 2]] * 0.9 + 0.02
+    there = np.array([True, True, True, False])
+    said = Answers(
+        np.arange(4.0), there, shares, ~there & False, np.full(4, np.nan), ~there & False, 20.0, []
+    )
+    one = Asked("a", "test", ["Bird", "Pedestrian", "hand", "hand"], said)
+    known = np.full((10, 5), 0.2)
+    counted = refusals(known, (shares, ["Bird", "Pedestrian", "fan", "rain"]), [one, one], [95])
+    assert counted[95, "a", "test", "Bird"] == (2, 2, 2, 2)
+    assert counted[95, "a", "test", "Pedestrian"] == (2, 2, 0, 0)
+    assert counted[95, "a", "test", "hand"] == (4, 2, 2, 2)
+    assert counted[95, "random radars", "simulated", "rain"] == (1, 1, 1, 0)
+    other = {key: value._replace(named=0) for key, value in counted.items()}
+    rows = {row[3]: row for row in over_seeds([counted, other])}
+    assert rows["hand"] == [95, "a", "test", "hand", 4, 50.0, 25.0, 0.0, 50.0, 50.0]

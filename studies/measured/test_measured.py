@@ -11,6 +11,7 @@ import accuracy
 import class_figures
 import fetch
 import foreign
+import h5py
 import numpy as np
 import pytest
 import recorded_sets
@@ -510,6 +511,18 @@ def test_the_spacing_of_a_comb_is_read_off(spacing_hz):
     assert spectral_figures.line_spacing_hz(signal, 5000.0, 60.0, 500.0) == pytest.approx(
         spacing_hz, abs=3
     )
+
+
+def test_the_sweeps_of_frames_without_pauses_follow_each_other(tmp_path):
+    """Two frames of three sweeps at two distances."""
+    values = np.arange(12.0).reshape(2, 3, 2)
+    frames = np.empty(values.shape, [("real", "<i2"), ("imag", "<i2")])
+    frames["real"] = values
+    frames["imag"] = -values
+    with h5py.File(tmp_path / "frames.h5", "w") as file:
+        file["sessions/session_0/group_0/entry_0/result/frame"] = frames
+    found = foreign.sweeps(tmp_path / "frames.h5", 1)
+    np.testing.assert_array_equal(found, np.arange(1, 12, 2) * (1 - 1j))
 
 
 def test_foreign_inputs_are_counted_and_a_hand_moves_at_its_speed(library):

@@ -1,10 +1,7 @@
 """The commands of `lowalt`: what they write and say, their exit status, and examples that parse."""
 
-import argparse
 import json
 import shlex
-import shutil
-import subprocess
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -12,6 +9,7 @@ import numpy as np
 import pytest
 import yaml
 
+from command_lines import assert_help_with_example, completions
 from dataset import build, publish
 from lowalt import Dataset
 from lowalt.__main__ import main
@@ -102,29 +100,8 @@ def test_every_command_has_help_with_an_example_that_parses(capsys, monkeypatch)
         f"\n    {name}" in whole and f"\n  {entry.example}\n" in whole
         for name, entry in COMMANDS.items()
     )
-    actions = [["target", action] for action in ("inspect", "new", "make", "show")]
-    for words in [[name] for name in COMMANDS] + actions:
-        with pytest.raises(SystemExit) as ended:
-            main([*words, "--help"])
-        text = " ".join(capsys.readouterr().out.split())
-        assert ended.value.code == 0 and "example: " in text
-        example = text.partition("example: ")[2].partition(", or ")[0]
-        assert f"lowalt {' '.join(words)}" in example
-        if words != ["completion"]:
-            parsed_only(monkeypatch, shlex.split(example)[1:])
-
-
-def parsed_only(monkeypatch, words):
-    """A command line is understood; nothing is run."""
-    whole = argparse.ArgumentParser.parse_args
-
-    def stop(self, *given):
-        whole(self, *given)
-        raise KeyError("understood")
-
-    with monkeypatch.context() as changed, pytest.raises(KeyError, match="understood"):
-        changed.setattr(argparse.ArgumentParser, "parse_args", stop)
-        main(words)
+    for name in COMMANDS:
+        assert_help_with_example([name], capsys, monkeypatch)
 
 
 ODD = (
@@ -190,39 +167,14 @@ def test_odd_inputs_end_with_2_and_one_clear_sentence(line, capsys, monkeypatch,
     ("words", "current", "wanted"),
     [
         (["lowalt"], "stat", ["status"]),
-        (["lowalt", "target"], "ma", ["make"]),
-        (["lowalt", "target", "make"], "--inp", ["--inputs"]),
         (["lowalt", "run"], "--dr", ["--dry-run"]),
         (["lowalt", "run"], "config/ti", ["config/tiny.yaml"]),
         ([".venv/bin/lowalt", "compare", "results"], "--js", ["--json"]),
     ],
 )
 def test_a_shell_completes_commands_options_and_files(words, current, wanted, capsys, monkeypatch):
-    assert main(["completion"]) == 0
-    words = " ".join(map(shlex.quote, [*words, current]))
-    text = (
-        f"{capsys.readouterr().out}\nCOMP_WORDS=({words}); COMP_CWORD=$((${{#COMP_WORDS[@]}} - 1));"
-        " _lowalt"
-    )
-    # Zsh lists files only while a person types.
-    names = ("bash",) if "/" in current else ("bash", "zsh")
-    shells = [shell for shell in map(shutil.which, names) if shell] or pytest.skip("no bash")
-    for shell in shells:
-        # A login's own settings of zsh stay out.
-        ran = subprocess.run(
-            [
-                shell,
-                *(["-f"] if shell.endswith("zsh") else []),
-                "-c",
-                text + '; printf "%s\\n" "${COMPREPLY[@]}"',
-            ],
-            capture_output=True,
-            text=True,
-            cwd=ROOT,
-        )
-        # Zsh itself leaves out what does not begin as the word does.
-        found = [word for word in ran.stdout.split() if word.startswith(current)]
-        assert ran.stderr == "" and found == wanted
+    for found in completions(words, current, capsys):
+        assert found == wanted
 
 
 def test_verify_and_remake_end_with_1_where_a_byte_differs(tmp_path, capsys):

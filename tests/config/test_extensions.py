@@ -10,7 +10,6 @@ from pathlib import Path
 
 import pytest
 
-import lowalt
 from lowalt.config import extensions
 from lowalt.config.core_commands import Command
 from lowalt.config.extensions import AddedEffect, Extension, found
@@ -68,16 +67,6 @@ def test_of_two_extensions_with_one_name_the_second_is_left_out(installed):
     seen = installed("GOOD", "AGAIN")
     assert len(seen.extensions) == 1
     assert "commands 'hum'" in seen.faults[0]
-
-
-def test_functions_of_extensions_stand_in_the_face_of_the_package():
-    functions = extensions.offered("functions")
-    assert set(functions) == {"draft_target", "inspect_recording"}
-    for name, module in functions.items():
-        assert getattr(lowalt, name).__module__ == module
-    assert set(functions) <= set(dir(lowalt))
-    with pytest.raises(AttributeError, match="no attribute 'hum'"):
-        _ = lowalt.hum
 
 
 @pytest.mark.parametrize("room", ROOMS)

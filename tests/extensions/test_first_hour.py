@@ -6,6 +6,7 @@ import yaml
 
 import lowalt
 from followed_pages import ROOT, SCHEMA, followed, linked_checkout
+from lowalt.config import extensions
 from lowalt.config.layers import load
 from lowalt.files.yaml_files import load_yaml
 from lowalt.shards.build import write_run
@@ -74,3 +75,13 @@ def test_the_first_hour(checkout, capsys, monkeypatch):
     )
     assert names["fourth"].station == "D" and len(names["hexacopter"].parts) == 7
     assert "m600.yaml: 'm600'" in printed and "reading 1; another" in printed
+
+
+def test_functions_of_extensions_stand_in_the_face_of_the_package():
+    functions = extensions.offered("functions")
+    assert set(functions) == {"draft_target", "inspect_recording"}
+    for name, module in functions.items():
+        assert getattr(lowalt, name).__module__ == module
+    assert set(functions) <= set(dir(lowalt))
+    with pytest.raises(AttributeError, match="no attribute 'hum'"):
+        _ = lowalt.hum

@@ -15,7 +15,7 @@ import model_files
 from lowalt.config.layers import merge
 from lowalt.files.errors import InputError
 from lowalt.files.yaml_files import load_yaml
-from lowalt.recognition import runs, score
+from lowalt.recognition import named_models, runs, score
 from lowalt.recognition.__main__ import main
 from lowalt.recognition.inference import Machine
 from lowalt.recognition.sample_sources import Source
@@ -117,9 +117,15 @@ def test_an_answer_depends_on_its_own_sample_alone(run, tmp_path):
 
 def test_a_folder_that_is_no_run_and_a_setting_that_is_none_are_refused(run, tmp_path):
     with pytest.raises(InputError, match="expected the folder of a finished run"):
-        lowalt.evaluate("default-seen", tmp_path)
+        lowalt.evaluate("results/zoo/default-seen.safetensors", tmp_path)
     with pytest.raises(InputError, match="stepps"):
         lowalt.train(run, "A:VRP+TRP+VT", out=tmp_path / "model", stepps=3)
+
+
+def test_a_name_where_no_extension_brings_models_is_no_choice_among_none(monkeypatch):
+    monkeypatch.setattr(named_models, "offered", lambda kind: {})
+    with pytest.raises(InputError, match=r"not a file, expected one$"):
+        named_models.path_of("default-seen")
 
 
 def test_confusion_is_read_at_one_snr_or_summed_over_all(tmp_path):

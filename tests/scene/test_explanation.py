@@ -88,13 +88,13 @@ def test_a_comb_changes_no_range_cell_of_a_near_target_and_its_ratio_is_that_of_
 
 
 def test_parts_of_an_effect_are_no_effects_of_a_suggested_scene():
-    whole = explanation.Change("town", "channel", True, 0.5)
+    whole = explanation.Change("clutter", "channel", True, 0.5)
     part = whole._replace(part="second order", signal=0.1)
-    text = explanation.suggested({"effects": {"town": {"buildings": "a.ply"}}}, [whole, part], 1e-3)
-    assert text.count("town:") == 1 and "0.5" in text
+    text = explanation.suggested({"effects": {"clutter": {"patches": 9}}}, [whole, part], 1e-3)
+    assert text.count("clutter:") == 1 and "0.5" in text
     table = explanation.effects_table([whole, part], sources=True)
     assert sum("its second order left out" in line for line in table) == 1
-    assert sum(line.startswith("town: ") for line in table) == 1
+    assert sum(line.startswith("clutter: ") for line in table) == 1
 
 
 def test_a_finding_says_how_fast_the_range_grows():

@@ -24,4 +24,5 @@ def path_of(model: str | Path) -> Path:
         if str(model) in names:
             return module.path_of(str(model))
         known += names
-    raise InputError(f"model {str(model)!r}: not a file, expected one, or a name among {known}")
+    expected = f"one, or a name among {known}" if known else "one"
+    raise InputError(f"model {str(model)!r}: not a file, expected {expected}")

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 import yaml
 
+from command_lines import assert_help_with_example, completions
 from json_answers import answered
 from lowalt.__main__ import main
 from lowalt.extensions.drafting import mesh_picture, target
@@ -68,3 +69,20 @@ def test_the_command_makes_a_record_with_its_row(tmp_path, monkeypatch):
         tmp_path, {"My bus": {key: value for key, value in BUS.items() if key != "row"}}, "bare"
     )
     assert main(["target", "make", bare, "--out", str(out)]) != 0
+
+
+def test_every_action_has_help_with_an_example_that_parses(capsys, monkeypatch):
+    for action in ("inspect", "new", "make", "show"):
+        assert_help_with_example(["target", action], capsys, monkeypatch)
+
+
+@pytest.mark.parametrize(
+    ("words", "current", "wanted"),
+    [
+        (["lowalt", "target"], "ma", ["make"]),
+        (["lowalt", "target", "make"], "--inp", ["--inputs"]),
+    ],
+)
+def test_a_shell_completes_actions_and_their_options(words, current, wanted, capsys):
+    for found in completions(words, current, capsys):
+        assert found == wanted

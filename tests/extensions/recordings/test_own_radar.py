@@ -17,6 +17,7 @@ from lowalt.extensions.recordings.own_radar import calibrated, snr_range, temper
 from lowalt.extensions.recordings.record import read_record, record
 from lowalt.extensions.recordings.twin import twin_of
 from lowalt.extensions.recordings.twin_scenes import Library
+from lowalt.extensions.recordings.twin_training import settings
 from lowalt.files.errors import InputError
 from lowalt.files.yaml_files import load_yaml
 from lowalt.machine.progress import Reporter
@@ -205,6 +206,13 @@ def test_the_temperature_makes_probabilities_true():
     labels = np.array([rng.choice(3, p=one) for one in truth])
     sharp = truth**2.5 / (truth**2.5).sum(axis=1, keepdims=True)
     assert temperature(sharp, labels) == pytest.approx(2.5, rel=0.05)
+
+
+def test_settings_hold_no_folder_of_this_machine_in_any_folder(tmp_path, monkeypatch):
+    """They become part of every model file."""
+    at_home = settings()
+    monkeypatch.chdir(tmp_path)
+    assert settings() == at_home and at_home["table"] == "config/schemes.csv"
 
 
 # Two minutes on a busy machine.

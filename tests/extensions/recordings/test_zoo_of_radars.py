@@ -19,6 +19,7 @@ def test_the_shipped_entries_of_radars_are_those_of_the_twins_there_are(name, mo
     assert (
         path.stat().st_size < zoo.LARGEST_BYTES and model_file.read(path).measured["percent"] > 80
     )
+    assert model_file.read(path).identity["settings"]["table"] == "config/schemes.csv"
     made = runs.opened(name)[1]
     radar = made["radar"]
     caution = records()[name].twin["caution"]

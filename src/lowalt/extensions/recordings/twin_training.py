@@ -49,11 +49,9 @@ def settings(path: str | Path = RECOGNITION, over: dict | None = None) -> dict:
             {key: block[key] for key in ("size", "training", "augmentation")},
         )
         simulation = {key: block[key] for key in ("scheme", "echoes", "receivers", "seeds")}
-        table = str(shipped(result["table"]))
         return {
             **result,
             **simulation,
-            "table": table,
             "images": default["images"],
             "seed": default["seed"],
         }
@@ -161,7 +159,7 @@ def train(
     keys = ("recordings", name, seed)
     colours = block["images"]["colour_map"]
     seeded(block["seed"], keys, block["training"]["threads"])
-    scheme = named(block["table"], block["scheme"], ["A"])
+    scheme = named(shipped(block["table"]), block["scheme"], ["A"])
     model = built(scheme, block["network"], block["size"], colours, len(classes))
     Path(folder).mkdir(parents=True, exist_ok=True)
     training = {key: block[key] for key in ("seed", "augmentation")}

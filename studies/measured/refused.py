@@ -1,0 +1,148 @@
+"""How much of what belongs to no class a network refuses, against how much it keeps of what it knows.
+
+A network with the fifth class "none of these" refuses a window where that class is more probable
+than each other. A constant in front of its probability sets how readily it does: it is chosen so
+that of the simulated windows of known classes, which no training saw, a share is kept.
+
+measured-refused.csv has a row for each such share (kept_percent) and for everything that was asked:
+    radar, half, what   the radar; "tuning" and "test" for labelled windows of recordings, "foreign"
+    for what belongs to no class (`foreign.yaml`), "simulated" for simulated windows; label or name
+    windows, found_percent   number, and the share that is taken for a target at all
+    named_percent   share of all windows that gets a known class, mean over training seeds;
+    seeds_low and seeds_high: the least and the most of any seed
+    right_percent   share of all windows that is answered rightly: its class, or none where it has
+    none
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from accuracy import is_right
+from labels import TOGETHER
+
+from lowalt.config.classes import CATEGORIES
+from lowalt.extensions.recordings.answers import UNNAMED, Answers
+from lowalt.extensions.recordings.twin import NO_CLASS
+from lowalt.recognition.samples import Facts
+
+REFUSED = (
+    "kept_percent",
+    "radar",
+    "half",
+    "what",
+    "windows",
+    "found_percent",
+    "named_percent",
+    "seeds_low",
+    "seeds_high",
+    "right_percent",
+)
+FOREIGN = "foreign"
+SIMULATED = "simulated"
+LEAST = 1e-12
+"""Least probability whose logarithm is taken."""
+
+
+class Asked(NamedTuple):
+    """What a network says of a recording, and what each of its windows is: a label, the name of what
+    belongs to no class, or "" for a window that does not count."""
+
+    radar: str
+    half: str
+    what: list[str]
+    answers: Answers
+
+
+Key = tuple[float, str, str, str]
+"""The first columns of a row: kept_percent, radar, half, what."""
+
+
+class Counts(NamedTuple):
+    """Numbers of windows: all, those found, those that get a known class, and those right."""
+
+    windows: int
+    found: int
+    named: int
+    right: int
+
+
+def leaning_for(shares: np.ndarray, kept_percent: float) -> float:
+    """Return the logarithm by which to divide the probability of no class, so that of windows of
+    known classes, with probabilities (n, classes) whose last is no class, a share is kept."""
+    logarithms = np.log(np.maximum(shares, LEAST))
+    over_known = logarithms[:, -1] - logarithms[:, :-1].max(axis=1)
+    return float(np.quantile(over_known, kept_percent / 100))
+
+
+def leant(shares: np.ndarray, leaning: float) -> np.ndarray:
+    """Return probabilities (n, classes) with that of no class, the last, divided by the exponential
+    of `leaning`."""
+    result = shares.copy()
+    result[:, -1] /= np.exp(leaning)
+    return result / result.sum(axis=1, keepdims=True)
+
+
+def _counted(what: list[str], outcomes: list[str]) -> dict[str, Counts]:
+    """The counts of each thing that windows are."""
+    result = {}
+    for name in dict.fromkeys(what):
+        if not name:
+            continue
+        of_name = [one for one, other in zip(outcomes, what, strict=True) if other == name]
+        named = sum(one in CATEGORIES for one in of_name)
+        found = sum(one not in UNNAMED for one in of_name)
+        right = len(of_name) - named
+        if set(name.split(TOGETHER)) <= {*CATEGORIES}:
+            right = sum(is_right(name, one) for one in of_name)
+        result[name] = Counts(len(of_name), found, named, right)
+    return result
+
+
+def simulated_names(facts: Facts) -> list[str]:
+    """Return what each simulated window is: its class, or the kind of what belongs to none."""
+    return [
+        CATEGORIES[label] if label < len(CATEGORIES) else str(subtype)
+        for label, subtype in zip(facts.label.tolist(), facts.subtype.tolist(), strict=True)
+    ]
+
+
+def refusals(
+    known: np.ndarray,
+    simulated: tuple[np.ndarray, list[str]],
+    said: list[Asked],
+    kept_percents: list[float],
+) -> dict[Key, Counts]:
+    """Return the counts of a network, by the first columns of `REFUSED`.
+
+    known: probabilities (n, classes) for simulated windows of known classes, which set the
+    constant; simulated: those for other simulated windows, and what each is.
+    """
+    classes = [*CATEGORIES, NO_CLASS]
+    result: dict[Key, Counts] = {}
+    for kept_percent in kept_percents:
+        leaning = leaning_for(known, kept_percent)
+        named = np.array(classes)[leant(simulated[0], leaning).argmax(axis=1)].tolist()
+        for name, counts in _counted(simulated[1], named).items():
+            result[kept_percent, "random radars", SIMULATED, name] = counts
+        for one in said:
+            shares = leant(one.answers.probabilities, leaning)
+            outcomes = one.answers._replace(probabilities=shares).outcomes(classes)
+            for name, counts in _counted(one.what, outcomes).items():
+                key = kept_percent, one.radar, one.half, name
+                before = result.get(key, Counts(0, 0, 0, 0))
+                sums = [int(a + b) for a, b in zip(before, counts, strict=True)]
+                result[key] = Counts(*sums)
+    return result
+
+
+def over_seeds(of_seeds: list[dict[Key, Counts]]) -> list[list]:
+    """Return the rows of `REFUSED` of networks of several training seeds."""
+    rows = []
+    for key, first in of_seeds[0].items():
+        counts = [of_seed[key] for of_seed in of_seeds]
+        named = [100 * one.named / one.windows for one in counts]
+        right = [100 * one.right / one.windows for one in counts]
+        found_percent = 100 * first.found / first.windows
+        row = [*key, first.windows, found_percent, float(np.mean(named))]
+        rows.append([*row, min(named), max(named), float(np.mean(right))])
+    return rows
