@@ -88,12 +88,13 @@ def test_the_table_has_each_labelled_recording_next_to_the_radar_s_own_network(
         images.append(len(given[0]))
         return rendered(*given)
 
-    def of_one_radar(path):
-        """Rows of the recordings asked about: other rows change none of these but cost bootstraps."""
-        return [row for row in own_rows(path) if (row[0], row[4]) == ("cw_24ghz", "tuning")]
+    def of_one_class(path):
+        """Rows of the class asked about: others change none of its rows, but cost bootstraps."""
+        asked = ("cw_24ghz", "tuning", "Pedestrian")
+        return [row for row in own_rows(path) if (row[0], row[4], row[6]) == asked]
 
     monkeypatch.setattr(any_radar, "rendered", noted)
-    monkeypatch.setattr(any_radar, "own_rows", of_one_radar)
+    monkeypatch.setattr(any_radar, "own_rows", of_one_class)
     folder = tmp_path / "inputs/walker_24ghz"
     folder.mkdir(parents=True)
     rate = 6000
