@@ -32,7 +32,7 @@ def pytest_configure(config):
     [
         ([MACHINE], [], 0, ["skipped: 1 x no bash"]),
         ([PACKAGE, FILE], [], 1, UNEXPECTED),
-        ([PACKAGE, FILE], ["-n", "1"], 1, UNEXPECTED),
+        ([PACKAGE, FILE], ["-n", "2"], 1, UNEXPECTED),
     ],
 )
 def test_a_strict_run_fails_where_a_test_is_skipped_for_a_reason_not_listed(
