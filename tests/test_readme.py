@@ -69,7 +69,7 @@ def test_the_share_of_two_subtypes_is_that_of_the_table():
 def test_the_accuracies_on_recordings_are_those_of_the_tables():
     of_balanced = {"half": "test", "class": "balanced"}
     airborne = row("reference/measured-further.csv", radar="bird_drone_10ghz", **of_balanced)
-    ground = row("reference/measured-labelled.csv", radar="cw_24ghz", **of_balanced)
+    ground = row("reference/measured-accuracy.csv", radar="cw_24ghz", **of_balanced)
     for kept, devices in ((airborne, "one radar"), (ground, "two radars")):
         interval = f"{decimal(kept['low'])} to {decimal(kept['high'])}"
         assert f"({kept['files']} files of {devices}, {interval})" in README

@@ -39,7 +39,16 @@ from fourth_radar import RECORDS as FOURTH
 from labels import intervals_of, label_of, read_labels
 from measured_tables import write_measured
 from recorded_sets import Measured, recordings, usable
-from refused import FOREIGN, REFUSED, Asked, over_seeds, refusals, simulated_names
+from refused import (
+    FOREIGN,
+    REFUSED,
+    Asked,
+    draw,
+    leaning_for,
+    over_seeds,
+    refusals,
+    simulated_names,
+)
 from torch import nn
 
 from lowalt.config.classes import CATEGORIES
@@ -79,6 +88,8 @@ HB100 = "hb100"
 OWN = ("right_percent", "low", "high", "devices_low", "devices_high", "named_percent")
 COLUMNS = (*ACCURACY, *(f"own_{key}" for key in OWN))
 SIMULATED = ("seed", "class", "windows", "right_percent")
+DRAWN_PERCENT = 95.0
+"""Share of known windows that the network keeps whose answers are drawn."""
 LEVELS = 255
 """Steps of an image's values above zero."""
 
@@ -407,7 +418,10 @@ def answers_of(
             else:
                 radar = f"{about.carrier_hz / 1e9:g} GHz"
                 twin = twin_of(about, read(about).rate_hz)
-            result.append(asked_of_none(radar, twin, name, about))
+            one = asked_of_none(radar, twin, name, about)
+            result.append(
+                one._replace(twin=twin.at_carrier(about.carrier_hz), baseband=read(about))
+            )
     return result
 
 
@@ -526,6 +540,8 @@ def main(arguments: list[str]) -> None:
         on_test = shares_of(trained.model, folds["test"]), simulated_names(folds["test"].facts)
         said = answers_of(trained, inputs, measured, options.inputs, block)
         of_seeds.append(refusals(shares, on_test, said, block["kept_percent"]))
+        if seed == seeds[0]:
+            draw(said, leaning_for(shares, DRAWN_PERCENT), options.out)
     write_measured(options.out, "refused", REFUSED, over_seeds(of_seeds))
 
 

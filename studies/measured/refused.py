@@ -14,15 +14,18 @@ measured-refused.csv has a row for each such share (kept_percent) and for everyt
     none
 """
 
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 from accuracy import is_right
-from labels import TOGETHER
+from labels import TOGETHER, picture
 
 from lowalt.config.classes import CATEGORIES
 from lowalt.extensions.recordings.answers import UNNAMED, Answers
-from lowalt.extensions.recordings.twin import NO_CLASS
+from lowalt.extensions.recordings.files import Baseband
+from lowalt.extensions.recordings.twin import NO_CLASS, Twin
+from lowalt.files.atomic import write_file
 from lowalt.recognition.samples import Facts
 
 REFUSED = (
@@ -45,12 +48,17 @@ LEAST = 1e-12
 
 class Asked(NamedTuple):
     """What a network says of a recording, and what each of its windows is: a label, the name of what
-    belongs to no class, or "" for a window that does not count."""
+    belongs to no class, or "" for a window that does not count.
+
+    twin, baseband: the radar and the samples, where a picture shall be drawn.
+    """
 
     radar: str
     half: str
     what: list[str]
     answers: Answers
+    twin: Twin | None = None
+    baseband: Baseband | None = None
 
 
 Key = tuple[float, str, str, str]
@@ -98,6 +106,27 @@ def _counted(what: list[str], outcomes: list[str]) -> dict[str, Counts]:
     return result
 
 
+def outcomes_of(said: Answers, leaning: float) -> list[str]:
+    """Return what each window is said to be, with the probability of no class divided by the
+    exponential of `leaning`."""
+    shares = leant(said.probabilities, leaning)
+    return said._replace(probabilities=shares).outcomes([*CATEGORIES, NO_CLASS])
+
+
+def draw(said: list[Asked], leaning: float, folder: Path) -> None:
+    """Draw the spectrogram of everything that has samples, with what is said of each window:
+    refused-NAME.png."""
+    for one in said:
+        if one.twin is None or one.baseband is None:
+            continue
+        starts_s = one.answers.starts_s.tolist()
+        outcomes = list(zip(starts_s, outcomes_of(one.answers, leaning), strict=True))
+        window_s = one.twin.symbols * one.twin.symbol_interval_s
+        name = one.what[0]
+        image = picture(one.baseband, one.twin.carrier_hz, [], name, window_s, {"said": outcomes})
+        write_file(folder / f"refused-{name.replace(' ', '-')}.png", image)
+
+
 def simulated_names(facts: Facts) -> list[str]:
     """Return what each simulated window is: its class, or the kind of what belongs to none."""
     return [
@@ -125,8 +154,7 @@ def refusals(
         for name, counts in _counted(simulated[1], named).items():
             result[kept_percent, "random radars", SIMULATED, name] = counts
         for one in said:
-            shares = leant(one.answers.probabilities, leaning)
-            outcomes = one.answers._replace(probabilities=shares).outcomes(classes)
+            outcomes = outcomes_of(one.answers, leaning)
             for name, counts in _counted(one.what, outcomes).items():
                 key = kept_percent, one.radar, one.half, name
                 before = result.get(key, Counts(0, 0, 0, 0))

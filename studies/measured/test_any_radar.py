@@ -103,6 +103,9 @@ def test_the_table_has_each_labelled_recording_next_to_the_radar_s_own_network(
     noise = np.random.default_rng(0).standard_normal(len(time))
     tone = (20000 * (0.2 * wave + 0.01 * noise)).astype(np.int16)
     wavfile.write(folder / "PCM2900_Best_Walking_Data.wav", rate, tone)
+    room = np.random.default_rng(1).integers(-9, 9, (8000, 8))
+    (tmp_path / "inputs/fourth").mkdir()
+    np.savetxt(tmp_path / "inputs/fourth/roomtone.txt", room, "%d")
     block = load_yaml(any_radar.SETTINGS)
     block |= {"radars": {"train": 2, "validation": 1, "test": 1}, "receivers": 1}
     block["echoes"] = {"usual": 1, "any speed": 1, "none of these": 2}
@@ -146,6 +149,8 @@ def test_the_table_has_each_labelled_recording_next_to_the_radar_s_own_network(
     }
     foreign = {row["radar"] for row in refused if row["half"] == "foreign"}
     assert foreign == {*radars(), "hb100"}
+    drawn = tmp_path / "out/refused-empty-room-at-24-GHz.png"
+    assert [*tmp_path.glob("out/*.png")] == [drawn] and drawn.read_bytes()[:4] == b"\x89PNG"
 
 
 def test_a_share_of_the_known_windows_is_kept_whatever_the_network_says_of_them():
