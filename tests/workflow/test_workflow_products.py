@@ -1,9 +1,6 @@
 """Names and files that follow from a configuration: those of stages, and those of planned jobs."""
 
 import json
-import os
-import subprocess
-import sys
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -93,38 +90,6 @@ def test_what_is_prepared_is_all_that_trainings_and_the_page_wait_for(folder):
     assert not [name for name in prepared if any(word in name for word in later)]
     without = job_of(planned(folder, {"recognition": {"cache": False}}, "prepared"), "prepared")
     assert without.files and not [name for name in without.files if "/views/" in name]
-
-
-def test_stages_before_the_first_training_and_tables_do_without_torch():
-    """In a process of its own: torch is not to be found there, as while `make` is still fetching
-    it.
-    """
-    stages = [
-        "targets",
-        "targets.gallery",
-        "motion",
-        "echo",
-        "noise",
-        "tiles",
-        "shards",
-        "shards.card",
-        "recognition",
-    ]
-    stages += [
-        "recognition.views",
-        "recognition.freeze",
-        "recognition.distances",
-        "measure.echo_cost",
-    ]
-    stages += ["report.figures.cost_plots", "config.layers", "workflow.run"]
-    stages += [
-        f"recognition.{name}"
-        for name in ("sample_sources", "evaluated", "tables", "score", "augment")
-    ]
-    program = "import sys; sys.modules['torch'] = sys.modules['timm'] = None; import importlib as i"
-    program += f"; [i.import_module('lowalt.' + name) for name in {stages}]"
-    environment = os.environ | {"PYTHONPATH": str(ROOT / "src")}
-    subprocess.run([sys.executable, "-c", program], env=environment, check=True)
 
 
 HIDDEN = {"effects": {"occlusion": {}}, "echo": {"tolerance": 1e-3}}
