@@ -143,6 +143,8 @@ def test_the_offline_container_asks_only_for_the_folder_of_wheels_and_makes_a_ta
 def test_a_run_can_be_planned_from_what_the_container_holds(tmp_path):
     folder = copied(tmp_path / "lowalt")
     environment = os.environ | {"PYTHONPATH": str(folder / "src")}
-    status, text = run(folder, ["-n", "--cores", "all"], environment)
+    status, text = run(
+        folder, ["-n", "--cores", "all", "--configfile", "config/tiny.yaml"], environment
+    )
     assert status == 0, text[-3000:]
     assert {"train", "report"} <= {line.split()[0] for line in text.splitlines() if line.strip()}

@@ -148,7 +148,10 @@ def lines(tmp_path_factory):
     """What TRIAL prints in a copy of the tree with one more effect and one more spectrum."""
     folder = tmp_path_factory.mktemp("tree")
     for name in ("src", "config", "workflow"):
-        shutil.copytree(ROOT / name, folder / name)
+        shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
+    # Machine code that is compiled for either tree serves both.
+    for compiled in (ROOT / "src").rglob("__pycache__"):
+        (folder / compiled.relative_to(ROOT)).symlink_to(compiled)
     (folder / "src/lowalt/scene/effects/receiver/dc_offset.py").write_text(EFFECT)
     enter(folder, "      adc:\n", ENTRY)
     (folder / "scene.yaml").write_text("run: leaky\neffects: {dc_offset: {share: 0.25}}\n")

@@ -34,6 +34,13 @@ def test_a_stage_imports_only_what_stands_before_it(stage):
 
 
 LIGHT = [stage for stage in STAGES if stage not in ("spectra", "recognition")]
+EARLY = (
+    "targets.gallery shards.card recognition recognition.views recognition.freeze"
+    " recognition.distances recognition.sample_sources recognition.evaluated recognition.tables"
+    " recognition.score recognition.augment measure.echo_cost report.figures.cost_plots"
+    " config.layers workflow.run"
+)
+"""What runs before the first training, while `make` may still be fetching torch, and tables."""
 SCENES = [{}, *({name: {}} for name in PLACES)]
 PROGRAMS = {
     **{
@@ -44,6 +51,13 @@ PROGRAMS = {
         "import sys, lowalt.echo.__main__, lowalt.noise.__main__; print('lowalt.scene' in"
         " sys.modules)"
     ),
+    "early": (
+        "import importlib, sys\n"
+        f"for name in {EARLY!r}.split():\n"
+        "    importlib.import_module('lowalt.' + name)\n"
+        "print('torch' in sys.modules)"
+    ),
+    "no cubes": "import sys, lowalt.shards.__main__; print('lowalt.tiles.cubes' in sys.modules)",
     "scenes": (
         "import os, sys, lowalt.echo.__main__, lowalt.scene.__main__, lowalt.noise.__main__\n"
         "from lowalt.scene.effects import called\n"
@@ -68,8 +82,9 @@ def said() -> dict[str, str]:
     return dict(zip(PROGRAMS, printed([*PROGRAMS.values()]), strict=True))
 
 
-def test_who_only_wants_data_never_imports_torch(said):
-    assert {stage: said[stage] for stage in LIGHT} == dict.fromkeys(LIGHT, "False\n")
+def test_data_and_what_comes_before_the_first_training_never_import_torch(said):
+    programs = [*LIGHT, "early"]
+    assert {name: said[name] for name in programs} == dict.fromkeys(programs, "False\n")
 
 
 def test_what_no_scene_names_is_not_imported(said):
@@ -80,8 +95,8 @@ def test_what_no_scene_names_is_not_imported(said):
     assert found == [set(scene) for scene in SCENES]
 
 
-def test_a_run_without_effects_imports_nothing_of_them(said):
-    assert said["plain"] == "False\n"
+def test_a_run_without_effects_and_shards_without_cubes_import_nothing_of_them(said):
+    assert said["plain"] == said["no cubes"] == "False\n"
 
 
 def test_the_plan_of_the_package_names_every_room():

@@ -54,7 +54,7 @@ def core(tmp_path_factory):
     attribute `folder` is that of the copy.
     """
     folder = tmp_path_factory.mktemp("core")
-    left_out = shutil.ignore_patterns("extensions", "__pycache__", "*.egg-info")
+    left_out = shutil.ignore_patterns("extensions", "*.egg-info")
     for name in COPIED:
         shutil.copytree(ROOT / name, folder / name, ignore=left_out)
     shutil.copy(ROOT / "Snakefile", folder)
@@ -95,8 +95,8 @@ def test_the_command_line_lists_the_commands_of_the_core(core):
     assert "extensions:" not in shown and "left out" not in shown
 
 
-def test_the_jobs_of_the_default_are_planned(core):
-    core("-m", "lowalt", "run", "-n", "--target", "data")
+def test_the_jobs_of_a_run_are_planned(core):
+    core("-m", "lowalt", "run", "-n", "--configfile", "config/tiny.yaml", "--target", "data")
 
 
 # All tests of the core in one process: some twenty minutes.

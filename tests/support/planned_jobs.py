@@ -5,9 +5,29 @@ import os
 from pathlib import Path
 from typing import NamedTuple
 
+from lowalt.config.layers import merge
 from snakemake_runs import run
 
 ROOT = Path(__file__).parents[2]
+FEW = {
+    "targets": {"select": ["DJI Mini 2", "Crow", "Owl", "NIO ET5T 2023", "Walking Pedestrian 5"]},
+    "motion": {"models": 100},
+}
+"""Fewer jobs than those of the default, of each rule and group."""
+BEFOREHAND = f"""
+sys.path[:0] = [{str(ROOT / "src")!r}, {str(ROOT / "tests/support")!r}]
+import kept_records
+from lowalt.config.layers import overlaid
+from lowalt.targets import records
+from lowalt.workflow import sources
+from lowalt.workflow.run import Run
+
+records.merge = kept_records.once(records.merge)
+Run.of(overlaid([]), {str(ROOT / "workflow/schemas/config.schema.yaml")!r}, None)
+for path in sources.PACKAGE.rglob("*.py"):
+    sources._imports(path, sources.PACKAGE.name)
+"""
+"""What each plan would do anew: import the package, merge its records and look for imports."""
 PROGRAM = """
 import json
 from pathlib import Path
@@ -52,14 +72,15 @@ def place(folder: Path) -> Path:
 
 
 def planned(folder: Path, overlay: dict, *targets: str) -> list[Job]:
-    """Return the jobs of an overlay on the default, each planned anew; targets: rules or files.
+    """Return the jobs of an overlay on `FEW`, each planned anew; targets: rules or files.
 
     folder: a `place`.
     """
-    (folder / "asked.json").write_text(json.dumps({"overlay": overlay, "targets": targets}))
+    asked = {"overlay": merge(FEW, overlay), "targets": targets}
+    (folder / "asked.json").write_text(json.dumps(asked))
     environment = os.environ | {"PYTHONPATH": str(folder / "src")}
     environment.pop("LOWALT_INPUTS", None)
-    status, text = run(folder, [], environment, PROGRAM)
+    status, text = run(folder, [], environment, PROGRAM, BEFOREHAND)
     assert status == 0, text[-4000:]
     return [Job(*job) for job in json.loads((folder / "found.json").read_text())]
 

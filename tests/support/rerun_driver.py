@@ -11,6 +11,11 @@ from pathlib import Path
 
 from snakemake.cli import main
 
+import kept_records
+from lowalt.targets import records
+
+records.merge = kept_records.once(records.merge)
+
 
 def said(*arguments: str) -> str:
     """What a run prints."""

@@ -9,7 +9,7 @@ UNSEEN = ("nio-et5t-2023", "walking-pedestrian-5")
 OVERLAY = {
     "run": "test",
     "targets": {"select": ["Crow", "NIO ET5T 2023", "DJI Mini 2", "Walking Pedestrian 5"]},
-    "motion": {"models": 20, "models_per_chunk": 10},
+    "motion": {"models": 10, "models_per_chunk": 10},
     "noise": {"snr_db": [8, float("inf")]},
 }
 # The region is given, so that it does not follow from the stations.
@@ -21,11 +21,11 @@ MESH = "meshes/uav/crazyflie_cf2_assembly.stl"
 
 # --- the model: which jobs follow from which ---
 
-PARTS = ("00000", "00001")
+PART = "00000"
 STATIONS = ("A", "B", "C")
 FOLDS = ("train", "val", "test")
 GROUPS = {"seen": SEEN, "unseen": UNSEEN}
-CHUNKS = [(group, part) for group in GROUPS for part in PARTS]
+CHUNKS = [(group, PART) for group in GROUPS]
 TRAININGS = [
     (protocol, scheme, "0") for protocol in GROUPS for scheme in ("a-vrp-trp-vt", "abc-vrp-trp-vt")
 ]
@@ -142,10 +142,8 @@ def added(part, groups, motion):
     samples.
     """
     rules = ("motion", "noise", "tiles") if motion else ("noise", "tiles")
-    own = {
-        (rule, group, f"{number}{part}") for rule in rules for group in groups for number in PARTS
-    }
-    chunks = [(group, f"{number}{part}") for group in groups for number in PARTS]
+    own = {(rule, group, PART + part) for rule in rules for group in groups}
+    chunks = [(group, PART + part) for group in groups]
     if motion:
         own |= (
             {("echo", *chunk, station) for chunk in chunks for station in STATIONS}

@@ -25,6 +25,7 @@ from snakemake.scheduling import job_scheduler
 from snakemake.persistence import file
 
 assert not any(name.split(".")[0] == "lowalt" for name in sys.modules)
+exec(sys.argv[1])
 # Looking for garbage among all that is imported takes a fifth of a run.
 gc.freeze()
 gc.enable()
@@ -50,10 +51,12 @@ exec(order["program"])
 
 
 @cache
-def _helper() -> subprocess.Popen:
-    """The process that runs are forked from, one for each process of pytest."""
+def _helper(beforehand: str) -> subprocess.Popen:
+    """The process that runs are forked from, one for each process of pytest and each program that
+    it runs first.
+    """
     started = subprocess.Popen(
-        [sys.executable, "-E", "-c", _HELPER],
+        [sys.executable, "-E", "-c", _HELPER, beforehand],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,
@@ -67,9 +70,12 @@ def run(
     arguments: Sequence[str],
     environment: Mapping[str, str],
     program: str = "snakemake.cli.main()",
+    beforehand: str = "",
 ) -> tuple[int, str]:
     """Exit status and text of `python -m snakemake ARGUMENTS` in `folder`, or of another Python
     program there.
+
+    beforehand: program whose imports and values the runs that name it share.
 
     Raises RuntimeError where the helper process has ended.
     """
@@ -81,7 +87,7 @@ def run(
             "said": said.name,
             "program": program,
         }
-        helper = _helper()
+        helper = _helper(beforehand)
         helper.stdin.write(json.dumps(order) + "\n")
         helper.stdin.flush()
         status = helper.stdout.readline()

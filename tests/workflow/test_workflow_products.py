@@ -1,9 +1,6 @@
 """Names and files that follow from a configuration: those of stages, and those of planned jobs."""
 
 import json
-import os
-import subprocess
-import sys
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -11,9 +8,10 @@ import pytest
 import yaml
 
 from configured import stages_of
+from lowalt.config.layers import merge
 from lowalt.files.errors import InputError
 from lowalt.files.yaml_files import load_yaml
-from planned_jobs import job_of, place, planned
+from planned_jobs import FEW, job_of, place, planned
 
 ROOT = Path(__file__).parents[2]
 CHUNK = SimpleNamespace(run="default", group="seen", part="00001", station="B", fold="train")
@@ -47,7 +45,7 @@ def test_samples_made_on_the_spot_need_clouds_and_surfaces_only_where_points_are
 
 def first_shard(overlay):
     """The first shard of the chunk, whose fold may be packed into several."""
-    shards = stages_of(overlay).run.plan.shards
+    shards = stages_of(merge(FEW, overlay)).run.plan.shards
     return next(name for name in shards if name.startswith("seen-train-00001"))
 
 
@@ -62,7 +60,7 @@ def test_a_job_reads_the_files_of_its_own_chunk_in_the_order_of_the_stations(fol
     assert job_of(jobs, "echo", station="B", **chunk).params["stations"] == ["B"]
     motion = job_of(jobs, "motion", **chunk)
     assert motion.params["span"] == ["--first", "50", "--count", "50"]
-    stages = stages_of()
+    stages = stages_of(FEW)
     clouds = [f"{BASE}/clouds/{subtype}.npz" for subtype in stages.motion.subtypes(CHUNK)]
     assert motion.inputs["clouds"] == clouds and len({*clouds}) == len(clouds)
     assert len(clouds) == len(stages.run.plan.groups["seen"])
@@ -92,38 +90,6 @@ def test_what_is_prepared_is_all_that_trainings_and_the_page_wait_for(folder):
     assert not [name for name in prepared if any(word in name for word in later)]
     without = job_of(planned(folder, {"recognition": {"cache": False}}, "prepared"), "prepared")
     assert without.files and not [name for name in without.files if "/views/" in name]
-
-
-def test_stages_before_the_first_training_and_tables_do_without_torch():
-    """In a process of its own: torch is not to be found there, as while `make` is still fetching
-    it.
-    """
-    stages = [
-        "targets",
-        "targets.gallery",
-        "motion",
-        "echo",
-        "noise",
-        "tiles",
-        "shards",
-        "shards.card",
-        "recognition",
-    ]
-    stages += [
-        "recognition.views",
-        "recognition.freeze",
-        "recognition.distances",
-        "measure.echo_cost",
-    ]
-    stages += ["report.figures.cost_plots", "config.layers", "workflow.run"]
-    stages += [
-        f"recognition.{name}"
-        for name in ("sample_sources", "evaluated", "tables", "score", "augment")
-    ]
-    program = "import sys; sys.modules['torch'] = sys.modules['timm'] = None; import importlib as i"
-    program += f"; [i.import_module('lowalt.' + name) for name in {stages}]"
-    environment = os.environ | {"PYTHONPATH": str(ROOT / "src")}
-    subprocess.run([sys.executable, "-c", program], env=environment, check=True)
 
 
 HIDDEN = {"effects": {"occlusion": {}}, "echo": {"tolerance": 1e-3}}
@@ -211,19 +177,21 @@ def test_an_own_backbone_is_read_by_its_training():
 
 @pytest.mark.workflow
 def test_views_come_from_the_tiles_stage_at_its_sizes_alone_and_never_for_signals(folder):
-    def views_of(size, overlay):
-        """The job that makes views of a size."""
-        path = f"{BASE}/views/{size}/{first_shard(overlay)}.npz"
-        return job_of(planned(folder, overlay, path), "views")
+    def views_of(overlay, *sizes):
+        """The jobs that make views of these sizes."""
+        shard = first_shard(overlay)
+        paths = [f"{BASE}/views/{size}/{shard}.npz" for size in sizes]
+        jobs = planned(folder, overlay, *paths)
+        return [job_of(jobs, "views", size=str(size)) for size in sizes]
 
-    sizes = {"tiles": {"reduced": [24, 32]}}
-    for size in (24, 32):
-        job = views_of(size, sizes)
+    *from_tiles, other_size = views_of({"tiles": {"reduced": [24, 32]}}, 24, 32, 48)
+    for size, job in zip((24, 32), from_tiles, strict=True):
         images = f"{BASE}/reduced/{size}/seen-00001.npy"
         motion = f"{BASE}/motion/seen-00001.csv"
         assert job.params["reduced"] == ["--reduced", images, "--motion", motion]
         assert "snr_db" in json.loads(job.params["settings"])
-    for job in (views_of(48, sizes), views_of(24, {"shards": {"kind": "signal"}})):
+    (of_signals,) = views_of({"shards": {"kind": "signal"}}, 24)
+    for job in (other_size, of_signals):
         assert job.params["reduced"] == [] and not job.inputs["reduced"]
         assert "snr_db" not in json.loads(job.params["settings"])
 
@@ -255,8 +223,8 @@ def test_a_run_on_another_s_data_reads_there(folder, monkeypatch):
     (made.parent / "views").mkdir(parents=True)
     (made.parent / "SHA256SUMS").touch()
     monkeypatch.chdir(folder)
-    made.write_text(yaml.safe_dump(load_yaml("config/default.yaml")))
-    stages = stages_of(overlay)
+    made.write_text(yaml.safe_dump(merge(load_yaml("config/default.yaml"), FEW)))
+    stages = stages_of(merge(FEW, overlay))
     job = SimpleNamespace(run="mine", scheme="abc-vrp-trp-vt")
     assert stages.recognition.samples(job)["views"][0].startswith(f"{BASE}/views/24/")
     benchmarks = stages.page.files(job)["benchmarks"]

@@ -17,7 +17,6 @@ from lowalt.shards.sizes import CELL_BYTES, cell_type
 from lowalt.shards.write import ChunkSamples, write_shard
 from lowalt.targets.cloud import read_clouds
 from lowalt.targets.occluders import read_all
-from lowalt.tiles.cubes import Cubes
 
 
 def write(arguments: list[str]) -> None:
@@ -84,6 +83,9 @@ def write(arguments: list[str]) -> None:
     if kind == "recipe":
         content, powers = clean_content(options.echoes, options.powers, network, len(rows))
     elif kind == "cube":
+        # With it come the kernels of the echo and of scenes, which take most of a job's start.
+        from lowalt.tiles.cubes import Cubes
+
         clouds = read_clouds(options.clouds)
         occluders = read_all(options.occluders) if options.occluders else None
         cubes = Cubes.from_settings(scene, clouds, occluders)

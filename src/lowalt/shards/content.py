@@ -1,6 +1,7 @@
 """Turns the files of a chunk into a function from (motion model, SNR) to the bytes of a member."""
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,9 +12,11 @@ from lowalt.noise.__main__ import load_echoes, load_powers
 from lowalt.shards.sample_record import npy
 from lowalt.shards.stored_cubes import of_cubes
 from lowalt.shards.write import Content
-from lowalt.tiles.cubes import Cubes
 from lowalt.tiles.signals import load_signals
 from lowalt.tiles.tile_files import Tiles
+
+if TYPE_CHECKING:
+    from lowalt.tiles.cubes import Cubes
 
 
 def _signals(kind: str, path: str | None, network: Network, shape: tuple[int, int]) -> np.ndarray:
@@ -80,7 +83,7 @@ def clean_content(
 
 
 def cube_content(
-    path: str | None, cubes: Cubes, rows: Sequence[dict], snrs: Sequence[float], cell_type: str
+    path: str | None, cubes: "Cubes", rows: Sequence[dict], snrs: Sequence[float], cell_type: str
 ) -> Content:
     """Return the content of cube shards from the chunk's noisy signals and what makes their cubes.
 

@@ -6,6 +6,7 @@ several shells, which may overlap. trimesh's sampler draws the faces independent
 drawn systematically, which halves the unevenness before thinning and spares the import.
 """
 
+import functools
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Self
@@ -100,16 +101,12 @@ def inside(surface: Surface, points: np.ndarray) -> np.ndarray:
     return result
 
 
-def loft(sections: np.ndarray, tips: np.ndarray | Sequence | None = None) -> Surface:
-    """Return the closed skin over sections (K, S, 3), each a loop of S points in the same sense.
+@functools.cache
+def _faces_between(rows: int, sides: int) -> np.ndarray:
+    """Return the triangles of `loft`, which follow from the numbers of loops and of their points.
 
-    Each end is closed by a fan from `tips` (2, 3), by default the middle of the end section. The
-    normals point outward for either sense of the loops.
+    Sections come first in the list of vertices, then both tips.
     """
-    sections = np.asarray(sections, float)
-    rows, sides, _ = sections.shape
-    if tips is None:
-        tips = portable.mean(sections[[0, -1]], 1)
     grid = np.arange(rows * sides).reshape(rows, sides)
     a = grid[:-1]
     b = np.roll(grid[:-1], -1, 1)
@@ -130,8 +127,21 @@ def loft(sections: np.ndarray, tips: np.ndarray | Sequence | None = None) -> Sur
         np.stack([np.full(sides, first), np.roll(grid[0], -1), grid[0]], -1),
         np.stack([np.full(sides, last), grid[-1], np.roll(grid[-1], -1)], -1),
     ]
+    return np.concatenate(faces)
+
+
+def loft(sections: np.ndarray, tips: np.ndarray | Sequence | None = None) -> Surface:
+    """Return the closed skin over sections (K, S, 3), each a loop of S points in the same sense.
+
+    Each end is closed by a fan from `tips` (2, 3), by default the middle of the end section. The
+    normals point outward for either sense of the loops.
+    """
+    sections = np.asarray(sections, float)
+    rows, sides, _ = sections.shape
+    if tips is None:
+        tips = portable.mean(sections[[0, -1]], 1)
     vertices = np.concatenate([sections.reshape(-1, 3), np.asarray(tips, float)])
-    return _outward(Surface(vertices, np.concatenate(faces)))
+    return _outward(Surface(vertices, _faces_between(rows, sides).copy()))
 
 
 def _outward(surface: Surface) -> Surface:
@@ -141,6 +151,12 @@ def _outward(surface: Surface) -> Surface:
     return surface.flipped()
 
 
+@functools.cache
+def _circle(sides: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return sine and cosine (sides,) of a turn in equal steps, which every loop is made from."""
+    return portable.sine_cosine_turns(np.arange(sides) / sides)
+
+
 def superellipse(
     half_a: float, half_b: float, exponent: float = 2.0, sides: int = 24
 ) -> np.ndarray:
@@ -148,7 +164,7 @@ def superellipse(
 
     n = 2 is an ellipse, a larger n a rounded rectangle.
     """
-    sine, cosine = portable.sine_cosine_turns(np.arange(sides) / sides)
+    sine, cosine = _circle(sides)
     along = np.sign(cosine) * portable.power(abs(cosine), 2 / exponent)
     across = np.sign(sine) * portable.power(abs(sine), 2 / exponent)
     return np.stack([half_a * along, half_b * across], 1)
@@ -159,7 +175,7 @@ def ellipsoid(
 ) -> Surface:
     """Return an ellipsoid with the half axes `radii` (3,) about `centre` (3,)."""
     out, up = portable.sine_cosine_turns(np.arange(1, sides // 2) / (2 * (sides // 2)))
-    sine, cosine = portable.sine_cosine_turns(np.arange(sides) / sides)
+    sine, cosine = _circle(sides)
     level = out[:, None, None] * np.stack([cosine, sine], 1)
     height = np.broadcast_to(up[:, None, None], (len(up), sides, 1))
     rings = np.concatenate([level, height], 2)
@@ -181,7 +197,7 @@ def tube(
     first = np.cross(tangents, reference)
     first /= portable.norm(first)[:, None]
     second = np.cross(tangents, first)
-    sine, cosine = portable.sine_cosine_turns(np.arange(sides) / sides)
+    sine, cosine = _circle(sides)
     rings = cosine[None, :, None] * first[:, None] + sine[None, :, None] * second[:, None]
     return loft(path[:, None] + radii[:, None, None] * rings)
 
@@ -224,7 +240,7 @@ def box(size: Iterable[float], centre: Iterable[float] = (0, 0, 0)) -> Surface:
 def ring(profile: np.ndarray, sides: int = 32) -> Surface:
     """Return a closed profile (S, 2) of (radius, height) turned about z, such as a tyre or duct."""
     profile = np.asarray(profile, float)
-    sine, cosine = portable.sine_cosine_turns(np.arange(sides) / sides)
+    sine, cosine = _circle(sides)
     x = cosine[:, None] * profile[:, 0]
     y = sine[:, None] * profile[:, 0]
     vertices = np.stack([x, y, np.broadcast_to(profile[:, 1], x.shape)], -1)

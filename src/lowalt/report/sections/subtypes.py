@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 
 import numpy as np
-from scipy.stats import mannwhitneyu
 
 from lowalt.recognition.predictions import Predictions, read, record
 from lowalt.recognition.protocols import folds
@@ -87,6 +86,9 @@ def _apart(always: list[str], sometimes: list[str], traits: Mapping[str, dict[st
     right = [traits[model] for model in sometimes if model in traits]
     if min(len(wrong), len(right)) < FEWEST:
         return ""
+    # Of all that the page imports only matplotlib takes longer, and most runs are too small for it.
+    from scipy.stats import mannwhitneyu
+
     chances = {}
     for name in TRAITS:
         test = mannwhitneyu([of[name] for of in wrong], [of[name] for of in right])
