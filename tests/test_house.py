@@ -35,10 +35,21 @@ def test_a_stage_imports_only_what_stands_before_it(stage):
 
 LIGHT = [stage for stage in STAGES if stage not in ("spectra", "recognition")]
 EARLY = (
-    "targets.gallery shards.card recognition recognition.views recognition.freeze"
-    " recognition.distances recognition.sample_sources recognition.evaluated recognition.tables"
-    " recognition.score recognition.augment measure.echo_cost report.figures.cost_plots"
-    " config.layers workflow.run"
+    "targets.gallery",
+    "shards.card",
+    "recognition",
+    "recognition.views",
+    "recognition.freeze",
+    "recognition.distances",
+    "recognition.sample_sources",
+    "recognition.evaluated",
+    "recognition.tables",
+    "recognition.score",
+    "recognition.augment",
+    "measure.echo_cost",
+    "report.figures.cost_plots",
+    "config.layers",
+    "workflow.run",
 )
 """What runs before the first training, while `make` may still be fetching torch, and tables."""
 SCENES = [{}, *({name: {}} for name in PLACES)]
@@ -53,7 +64,7 @@ PROGRAMS = {
     ),
     "early": (
         "import importlib, sys\n"
-        f"for name in {EARLY!r}.split():\n"
+        f"for name in {EARLY!r}:\n"
         "    importlib.import_module('lowalt.' + name)\n"
         "print('torch' in sys.modules)"
     ),

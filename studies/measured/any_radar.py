@@ -1,8 +1,8 @@
-"""One network for any radar, against one network per radar.
+"""Networks for any radar, against one network per radar.
 
     python studies/measured/any_radar.py --inputs FOLDER --out FOLDER --models FOLDER
 
-The network learns from simulated windows of radars that are drawn at random (`any_radar.yaml`), in
+A network learns from simulated windows of radars that are drawn at random (`any_radar.yaml`), in
 front of the usual scenes. No drawn radar is a measured one, and nothing that was fitted to a
 recording is used, so every measured radar is one that was left out. The rows of its images are
 absolute speeds in m/s, the same for all radars, because the sign of the Doppler is lost in a real
@@ -11,6 +11,8 @@ channel; rows that a radar does not hear are zero.
 The table measured-any-radar.csv has, of every labelled window of the recordings, how many are named
 right, with the columns of measured-accuracy.csv and next to them what the radar's own network says
 of the same files. The rows of radar "any" hold all radars that have an own network.
+
+A second network learns a fifth class as well, none of these: measured-refused.csv (`refused.py`).
 """
 
 import argparse
@@ -259,6 +261,7 @@ class Drawing:
         twin = self.twin(fold, number)
         echoes = self.block["echoes"][which]
         receivers = self.block["receivers"]
+        # The random streams of the usual scenes are named without their set.
         of_set = () if which == USUAL else (which,)
         result = np.empty((len(self.scenes[which]), echoes, receivers, twin.symbols), np.complex64)
         subtypes = []
@@ -381,15 +384,10 @@ def rows_of(
     return result
 
 
-def answers_of(
-    trained: Trained,
-    recordings: list[tuple[str, Twin, Measured]],
-    measured: dict[str, Twin],
-    inputs: Path,
-    block: dict,
+def answers_on_recordings(
+    trained: Trained, recordings: list[tuple[str, Twin, Measured]], block: dict
 ) -> list[Asked]:
-    """Return what a network says of labelled recordings and of what belongs to no class; measured:
-    the radars by name; inputs: folder of the recordings."""
+    """Return what a network says of recordings whose windows have labels."""
     intervals_by_file = read_labels()
     result = []
     for radar, twin, one in recordings:
@@ -397,6 +395,17 @@ def answers_of(
         stretches = intervals_of(intervals_by_file, one.set, one.name, one.record.label)
         labels = [label_of(start_s, window_s(twin), stretches) for start_s in found.starts_s]
         result.append(Asked(radar, one.half, [label or "" for label in labels], found))
+    return result
+
+
+def answers_on_foreign(
+    trained: Trained, measured: dict[str, Twin], inputs: Path, block: dict
+) -> list[Asked]:
+    """Return what a network says of inputs without a class.
+
+    measured: the radars by name; inputs: folder of the recordings.
+    """
+    result = []
 
     def asked_of_none(radar: str, twin: Twin, name: str, about: Record) -> Asked:
         """What the network says of an input of no class."""
@@ -408,7 +417,6 @@ def answers_of(
             for name, about in simulated_inputs(twin, Path(folder)):
                 result.append(asked_of_none(radar, twin, name, about))
         for name, about in recorded_inputs(inputs, Path(folder)):
-            # A labelled one is of a class: a car in front of another radar.
             if about.label:
                 continue
             near = [radar for radar, twin in measured.items() if twin.near(about.carrier_hz)]
@@ -501,8 +509,51 @@ def compared(rows: list[list], own: list[list], seed: int) -> list[list]:
     ]
 
 
+def write_compared(
+    drawing: Drawing, inputs: list[tuple[str, Twin, Measured]], options: argparse.Namespace
+) -> None:
+    """Train the network of the known classes and write its tables, next to each radar's own."""
+    block = drawing.block
+    folds = folds_of(drawing, NAME, options.models)
+    rows = []
+    simulated = []
+    for seed in block["recognition"]["seeds"]:
+        trained = learned(block, folds, NAME, seed, options.models)
+        simulated += simulated_rows(trained.model, folds["test"], seed)
+        rows += rows_of(trained, seed, inputs, block)
+    own = own_rows(REFERENCE / "measured-recognition.csv")
+    table = compared(rows, own, block["recognition"]["seed"])
+    write_measured(options.out, "any-radar", COLUMNS, table)
+    write_measured(options.out, "any-radar-files", RECOGNITION, rows)
+    write_measured(options.out, "any-radar-simulated", SIMULATED, simulated)
+
+
+def write_refused(
+    drawing: Drawing,
+    inputs: list[tuple[str, Twin, Measured]],
+    measured: dict[str, Twin],
+    options: argparse.Namespace,
+) -> None:
+    """Train the network that refuses, write its table, and draw what the first seed's one says."""
+    block = drawing.block
+    folds = folds_of(drawing, REFUSING, options.models)
+    known = folds["validation"].facts.label < len(CATEGORIES)
+    seeds = block["recognition"]["seeds"]
+    of_seeds = []
+    for seed in seeds:
+        trained = learned(block, folds, REFUSING, seed, options.models)
+        shares = shares_of(trained.model, folds["validation"])[known]
+        on_test = shares_of(trained.model, folds["test"]), simulated_names(folds["test"].facts)
+        said = answers_on_recordings(trained, inputs, block)
+        said += answers_on_foreign(trained, measured, options.inputs, block)
+        of_seeds.append(refusals(shares, on_test, said, block["kept_percent"]))
+        if seed == seeds[0]:
+            draw(said, leaning_for(shares, DRAWN_PERCENT), options.out)
+    write_measured(options.out, "refused", REFUSED, over_seeds(of_seeds))
+
+
 def main(arguments: list[str]) -> None:
-    """Simulate, train one network a seed, ask it about the recordings and write the tables."""
+    """Train both networks for any radar, ask them about the recordings and write the tables."""
     line = argparse.ArgumentParser(prog="any_radar.py", description=main.__doc__)
     line.add_argument("--inputs", required=True, type=Path, help="folder of the measured sets")
     line.add_argument("--out", required=True, type=Path, help="folder to write")
@@ -516,33 +567,8 @@ def main(arguments: list[str]) -> None:
     measured = {**library.twins, HB100: fourth_twin(options.inputs)}
     drawing = Drawing(block, library, list(measured.values()))
     inputs = asked(block, library, options.inputs, options.half)
-    seeds = block["recognition"]["seeds"]
-
-    rows = []
-    simulated = []
-    folds = folds_of(drawing, NAME, options.models)
-    for seed in seeds:
-        trained = learned(block, folds, NAME, seed, options.models)
-        simulated += simulated_rows(trained.model, folds["test"], seed)
-        rows += rows_of(trained, seed, inputs, block)
-    own = own_rows(REFERENCE / "measured-recognition.csv")
-    table = compared(rows, own, block["recognition"]["seed"])
-    write_measured(options.out, "any-radar", COLUMNS, table)
-    write_measured(options.out, "any-radar-files", RECOGNITION, rows)
-    write_measured(options.out, "any-radar-simulated", SIMULATED, simulated)
-
-    folds = folds_of(drawing, REFUSING, options.models)
-    of_seeds = []
-    for seed in seeds:
-        trained = learned(block, folds, REFUSING, seed, options.models)
-        known = folds["validation"].facts.label < len(CATEGORIES)
-        shares = shares_of(trained.model, folds["validation"])[known]
-        on_test = shares_of(trained.model, folds["test"]), simulated_names(folds["test"].facts)
-        said = answers_of(trained, inputs, measured, options.inputs, block)
-        of_seeds.append(refusals(shares, on_test, said, block["kept_percent"]))
-        if seed == seeds[0]:
-            draw(said, leaning_for(shares, DRAWN_PERCENT), options.out)
-    write_measured(options.out, "refused", REFUSED, over_seeds(of_seeds))
+    write_compared(drawing, inputs, options)
+    write_refused(drawing, inputs, measured, options)
 
 
 if __name__ == "__main__":

@@ -98,10 +98,11 @@ def recorded_inputs(recorded: Path, folder: Path) -> Iterator[tuple[str, Record]
 
 
 def sweeps(path: Path, distance: int) -> np.ndarray:
-    """Return the samples (n,) complex128 at one distance out of the frames (frames, sweeps,
-    distances) of a file of acconeer's exploration tool whose sensor paused between no frames.
+    """Return the samples (n,) complex128 at one distance out of a file of acconeer's exploration
+    tool, whose array has the axes frames, sweeps and distances.
 
-    Source: the tool's documentation, continuous sweep mode.
+    The sensor measured in continuous sweep mode: no time passes between two frames.
+    Source: the documentation of the tool.
     """
     with h5py.File(path) as file:
         frames = file["sessions/session_0/group_0/entry_0/result/frame"][()]

@@ -1,24 +1,28 @@
-"""How much of what belongs to no class a network refuses, against how much it keeps of what it knows.
+"""Which share of the windows without a class a network refuses, and which of the others it keeps.
 
-A network with the fifth class "none of these" refuses a window where that class is more probable
-than each other. A constant in front of its probability sets how readily it does: it is chosen so
-that of the simulated windows of known classes, which no training saw, a share is kept.
+A network with the fifth class "none of these" refuses a window where that class is the most
+probable. Its probability is divided by a constant first, which is chosen so that a given share of
+simulated windows of the known classes is kept. No training saw these windows.
 
-measured-refused.csv has a row for each such share (kept_percent) and for everything that was asked:
-    radar, half, what   the radar; "tuning" and "test" for labelled windows of recordings, "foreign"
-    for what belongs to no class (`foreign.yaml`), "simulated" for simulated windows; label or name
-    windows, found_percent   number, and the share that is taken for a target at all
-    named_percent   share of all windows that gets a known class, mean over training seeds;
-    seeds_low and seeds_high: the least and the most of any seed
-    right_percent   share of all windows that is answered rightly: its class, or none where it has
-    none
+measured-refused.csv has a row for each such share and for everything that the network was asked:
+    kept_percent: the given share
+    radar: name of the radar
+    half: "tuning" or "test" for labelled windows of recordings, "foreign" for inputs without a
+        class (`foreign.yaml`), "simulated" for simulated windows
+    what: the label, or the name of the input
+    windows: their number
+    found_percent: share of the windows that the detector takes for a target
+    named_percent: share of the windows that the network gives a known class, mean over training
+        seeds; seeds_low and seeds_high: the least and the most of any seed
+    right_percent: share of the windows that get their class, or none where they have none; mean
+        over training seeds
 """
 
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from accuracy import is_right
+from accuracy import is_right, window_s
 from labels import TOGETHER, picture
 
 from lowalt.config.classes import CATEGORIES
@@ -47,10 +51,10 @@ LEAST = 1e-12
 
 
 class Asked(NamedTuple):
-    """What a network says of a recording, and what each of its windows is: a label, the name of what
-    belongs to no class, or "" for a window that does not count.
+    """A recording that a network was asked about, and its answers.
 
-    twin, baseband: the radar and the samples, where a picture shall be drawn.
+    what: of each window its label, the name of an input without a class, or "" where it does not
+    count; twin, baseband: the radar and the samples, where a picture is to be drawn.
     """
 
     radar: str
@@ -75,16 +79,18 @@ class Counts(NamedTuple):
 
 
 def leaning_for(shares: np.ndarray, kept_percent: float) -> float:
-    """Return the logarithm by which to divide the probability of no class, so that of windows of
-    known classes, with probabilities (n, classes) whose last is no class, a share is kept."""
+    """Return the logarithm of the constant at which a share of windows of known classes is kept.
+
+    shares: their probabilities (n, classes), of which the last is that of no class.
+    """
     logarithms = np.log(np.maximum(shares, LEAST))
     over_known = logarithms[:, -1] - logarithms[:, :-1].max(axis=1)
     return float(np.quantile(over_known, kept_percent / 100))
 
 
 def leant(shares: np.ndarray, leaning: float) -> np.ndarray:
-    """Return probabilities (n, classes) with that of no class, the last, divided by the exponential
-    of `leaning`."""
+    """Return probabilities (n, classes) after the last, that of no class, is divided by the
+    constant exp(leaning)."""
     result = shares.copy()
     result[:, -1] /= np.exp(leaning)
     return result / result.sum(axis=1, keepdims=True)
@@ -107,8 +113,7 @@ def _counted(what: list[str], outcomes: list[str]) -> dict[str, Counts]:
 
 
 def outcomes_of(said: Answers, leaning: float) -> list[str]:
-    """Return what each window is said to be, with the probability of no class divided by the
-    exponential of `leaning`."""
+    """Return what each window is said to be at the constant exp(leaning)."""
     shares = leant(said.probabilities, leaning)
     return said._replace(probabilities=shares).outcomes([*CATEGORIES, NO_CLASS])
 
@@ -121,9 +126,9 @@ def draw(said: list[Asked], leaning: float, folder: Path) -> None:
             continue
         starts_s = one.answers.starts_s.tolist()
         outcomes = list(zip(starts_s, outcomes_of(one.answers, leaning), strict=True))
-        window_s = one.twin.symbols * one.twin.symbol_interval_s
         name = one.what[0]
-        image = picture(one.baseband, one.twin.carrier_hz, [], name, window_s, {"said": outcomes})
+        length_s = window_s(one.twin)
+        image = picture(one.baseband, one.twin.carrier_hz, [], name, length_s, {"said": outcomes})
         write_file(folder / f"refused-{name.replace(' ', '-')}.png", image)
 
 
@@ -166,6 +171,7 @@ def refusals(
 def over_seeds(of_seeds: list[dict[Key, Counts]]) -> list[list]:
     """Return the rows of `REFUSED` of networks of several training seeds."""
     rows = []
+    # Numbers of windows and what the detector finds do not depend on the network.
     for key, first in of_seeds[0].items():
         counts = [of_seed[key] for of_seed in of_seeds]
         named = [100 * one.named / one.windows for one in counts]

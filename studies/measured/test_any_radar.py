@@ -3,7 +3,6 @@ measured one, and its table stands next to what the radars' own networks say.
 """
 
 from dataclasses import replace
-from functools import cache
 
 import any_radar
 import numpy as np
@@ -14,7 +13,6 @@ from refused import REFUSED, Asked, leaning_for, leant, over_seeds, refusals
 from scipy.io import wavfile
 
 from lowalt.config.network import SPEED_OF_LIGHT
-from lowalt.extensions.recordings import answers
 from lowalt.extensions.recordings.answers import Answers
 from lowalt.extensions.recordings.twin import Twin, radars
 from lowalt.files.csv_tables import read_csv
@@ -97,8 +95,6 @@ def test_the_table_has_each_labelled_recording_next_to_the_radar_s_own_network(
 
     monkeypatch.setattr(any_radar, "rendered", noted)
     monkeypatch.setattr(any_radar, "own_rows", of_one_class)
-    # The records of radars are the same for every recording that is asked about.
-    monkeypatch.setattr(answers, "radars", cache(radars))
     folder = tmp_path / "inputs/walker_24ghz"
     folder.mkdir(parents=True)
     rate = 6000

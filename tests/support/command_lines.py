@@ -1,4 +1,4 @@
-"""Command lines: their help, what they parse, and what a shell completes."""
+"""Checks of the help, the parsing and the shell completion of command lines."""
 
 import argparse
 import shlex

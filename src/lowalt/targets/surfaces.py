@@ -151,7 +151,6 @@ def _outward(surface: Surface) -> Surface:
     return surface.flipped()
 
 
-@functools.cache
 def _circle(sides: int) -> tuple[np.ndarray, np.ndarray]:
     """Return sine and cosine (sides,) of a turn in equal steps, which every loop is made from."""
     return portable.sine_cosine_turns(np.arange(sides) / sides)

@@ -49,7 +49,7 @@ def check_tools(scene, tmp_path, monkeypatch, mlcroissant):
     The hub's library, Croissant's and WebDataset read all samples.
     """
     config = overlaid([scene, FEW])
-    config["noise"]["snr_db"] = config["noise"]["snr_db"][:1]
+    config["noise"]["snr_db"] = config["noise"]["snr_db"][:2]
     kind = "cube" if config["shards"]["kind"] == "cube" else "signal"
     dataset = Dataset(config)
     write_run(dataset, tmp_path / "run", kind, clouds=False)

@@ -87,15 +87,14 @@ def answers(
     Raises: InputError where the network knows no recordings, the recording's carrier or channel is
     not the radar's, or the file cannot be read.
     """
-    known = radars()
     if "radar" not in settings:
         raise InputError(
             f"{trained.path}: knows no recordings, expected a network of a radar such as"
-            f" {sorted(known)}"
+            f" {sorted(radars())}"
         )
     radar = Twin.from_settings(settings["radar"])
     if not radar.near(record.carrier_hz):
-        near = [name for name, other in known.items() if other.near(record.carrier_hz)]
+        near = [name for name, other in radars().items() if other.near(record.carrier_hz)]
         expected = f"a network of {near}"
         if not near:
             expected = "a network of your own radar, which `lowalt recording train` makes; the zoo has none"

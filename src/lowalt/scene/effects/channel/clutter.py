@@ -8,7 +8,6 @@ are those of the range sum, and the Doppler frequency is that along the bisector
 """
 
 import math
-from itertools import accumulate
 
 import numpy as np
 from scipy import fft
@@ -72,11 +71,9 @@ def alike(uniform: np.ndarray, correlation: float) -> np.ndarray:
     score[:, 1:] *= np.sqrt(1 - correlation**2)
     # `scipy.signal.lfilter` gives the same bytes, but its import takes as long as all other imports
     # of a scene together.
-    filtered = [
-        list(accumulate(row, lambda before, score: score + correlation * before))
-        for row in score.tolist()
-    ]
-    return ndtr(np.array(filtered))
+    for cell in range(1, score.shape[1]):
+        score[:, cell] += correlation * score[:, cell - 1]
+    return ndtr(score)
 
 
 def texture(law: str, shape: float, uniform: np.ndarray) -> np.ndarray:
