@@ -15,9 +15,11 @@ from scipy.io import wavfile
 from lowalt.config.network import SPEED_OF_LIGHT
 from lowalt.extensions.recordings.answers import Answers
 from lowalt.extensions.recordings.twin import Twin, radars
+from lowalt.extensions.recordings.twin_scenes import intervals
 from lowalt.files.csv_tables import read_csv
 from lowalt.files.yaml_files import load_yaml
 from lowalt.numerics.streams import stream
+from lowalt.recognition import model_file
 
 SIZE = 32
 VIEW = View(0.1, 0.2, 60.0, "logarithmic")
@@ -82,6 +84,18 @@ def test_the_table_has_each_labelled_recording_next_to_the_radar_s_own_network(
 ):
     """Networks of two steps: what they say is of no use, where it stands is."""
     images = []
+    courses = set()
+    known_windows = []
+
+    def drawn_from(twin, scene, *given):
+        """Draw intervals and note from which scene."""
+        courses.add((scene.get("course"), "scene" in scene.get("second", {})))
+        return intervals(twin, scene, *given)
+
+    def refused_by(known, *given):
+        """Count refusals and note how many windows set the constant."""
+        known_windows.append(len(known))
+        return refusals(known, *given)
 
     def noted(*given):
         """Make images and note of how many intervals."""
@@ -93,6 +107,8 @@ def test_the_table_has_each_labelled_recording_next_to_the_radar_s_own_network(
         asked = ("cw_24ghz", "tuning", "Pedestrian")
         return [row for row in own_rows(path) if (row[0], row[4], row[6]) == asked]
 
+    monkeypatch.setattr(any_radar, "intervals", drawn_from)
+    monkeypatch.setattr(any_radar, "refusals", refused_by)
     monkeypatch.setattr(any_radar, "rendered", noted)
     monkeypatch.setattr(any_radar, "own_rows", of_one_class)
     folder = tmp_path / "inputs/walker_24ghz"
@@ -106,11 +122,14 @@ def test_the_table_has_each_labelled_recording_next_to_the_radar_s_own_network(
     room = np.random.default_rng(1).integers(-9, 9, (8000, 8))
     (tmp_path / "inputs/fourth").mkdir()
     np.savetxt(tmp_path / "inputs/fourth/roomtone.txt", room, "%d")
+    # A car in front of another radar has a label, and is not asked about as one without a class.
+    wavfile.write(tmp_path / "inputs/fourth/Car40kmh.wav", rate, tone)
     block = load_yaml(any_radar.SETTINGS)
-    block |= {"radars": {"train": 2, "validation": 1, "test": 1}, "receivers": 1}
+    block |= {"radars": {"train": 2, "validation": 1, "test": 2}, "receivers": 1}
     block["echoes"] = {"usual": 1, "any speed": 1, "none of these": 2}
-    for network in block["networks"].values():
-        network["steps"] = 2
+    steps = {"any": 2, "refusing": 3}
+    for name, network in block["networks"].items():
+        network["steps"] = steps[name]
     block |= {"carrier_hz": [8e9, 10e9], "fastest_mps": [8.0, 9.0], "symbols": [200, 500]}
     block["recognition"] |= {
         "seeds": [0, 1],
@@ -130,9 +149,16 @@ def test_the_table_has_each_labelled_recording_next_to_the_radar_s_own_network(
     ]
     assert {row["windows"] for row in rows} == {"12"}
     # Three folds have an interval of each class; then both networks are asked about the recording.
-    assert images[:6] == [4, 4, 4, 4, 12, 12]
+    assert images[:7] == [4, 4, 4, 4, 4, 12, 12]
     # The network that refuses learns from two sets of scenes, and from two echoes of no class.
-    assert images[6:18] == [4, 4, 4, 4, 2, 2, 4, 4, 2, 4, 4, 2]
+    assert images[7:22] == [4, 4, 4, 4, 2, 2, 4, 4, 2, 4, 4, 4, 4, 2, 2]
+    # Of the scenes at any speed, radars take one after the other.
+    assert {("pass", False), ("pass", True), ("to_and_fro", False)} <= courses
+    assert known_windows == [8, 8]
+    for name, count in steps.items():
+        for seed in (0, 1):
+            trained = model_file.read(tmp_path / f"models/{name}-{seed}/model.safetensors")
+            assert trained.identity["settings"]["training"]["steps"] == count
     kept = read_csv("results/reference/measured-accuracy.csv")
     own = [row for row in kept if (row["radar"], row["half"]) == ("cw_24ghz", "tuning")]
     of_class = next(row for row in own if row["class"] == "Pedestrian")
@@ -140,7 +166,7 @@ def test_the_table_has_each_labelled_recording_next_to_the_radar_s_own_network(
         # The kept cells of each file are rounded as well.
         assert float(rows[0][f"own_{key}"]) == pytest.approx(float(of_class[key]), rel=1e-4)
     simulated = read_csv(tmp_path / "out/measured-any-radar-simulated.csv", *any_radar.SIMULATED)
-    assert len(simulated) == 8 and {row["windows"] for row in simulated} == {"1"}
+    assert len(simulated) == 8 and {row["windows"] for row in simulated} == {"2"}
     refused = read_csv(tmp_path / "out/measured-refused.csv", *REFUSED)
     assert {float(row["kept_percent"]) for row in refused} == {99.0, 95.0, 90.0, 80.0}
     walks = [row for row in refused if row["half"] == "tuning"]

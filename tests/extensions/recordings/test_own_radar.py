@@ -17,7 +17,8 @@ from lowalt.extensions.recordings.own_radar import calibrated, snr_range, temper
 from lowalt.extensions.recordings.record import read_record, record
 from lowalt.extensions.recordings.twin import twin_of
 from lowalt.extensions.recordings.twin_scenes import Library
-from lowalt.extensions.recordings.twin_training import settings
+from lowalt.extensions.recordings.twin_training import settings, train
+from lowalt.extensions.recordings.window_samples import Windows, facts
 from lowalt.files.errors import InputError
 from lowalt.files.yaml_files import load_yaml
 from lowalt.machine.progress import Reporter
@@ -213,6 +214,16 @@ def test_settings_hold_no_folder_of_this_machine_in_any_folder(tmp_path, monkeyp
     at_home = settings()
     monkeypatch.chdir(tmp_path)
     assert settings() == at_home and at_home["table"] == "config/schemes.csv"
+
+
+def test_a_network_is_trained_in_any_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    block = settings(over={"size": 24, "training": {"steps": 1, "batch": 4, "validate_every": 1}})
+    images = np.random.default_rng(0).integers(0, 255, (8, 3, 24, 24), np.uint8)
+    about = facts(np.arange(8) % 4, ["a target"] * 8, np.arange(8), np.zeros(8), "train")
+    windows = dict.fromkeys(("train", "validation"), Windows(images, about))
+    network = train(block, windows, "mine", 0, tmp_path / "mine")
+    assert not network.training and (tmp_path / "mine/model.safetensors").is_file()
 
 
 # Two minutes on a busy machine.
