@@ -78,14 +78,15 @@ $(BYTECODE): $(TESTING)
 	@$(BIN)/python -m pytest --collect-only -q >.venv/bytecode.log 2>&1 || true
 	@touch $@
 
-# The tests' own machine code is compiled while their bytecode is written: that of scenes and of a town, and that of the
-# processors that tests emulate.
+# The tests' own machine code is compiled while their bytecode is written: that of scenes, of a town and of an echo with a
+# tolerance, and that of the processors that tests emulate.
 SAMPLE = lowalt sample Owl 0 --raw cells --out $@-made --overlay
 SMALL = lowalt.shards.build --config config/default.yaml config/tiny.yaml tests/data/small.yaml --out $@-made
 $(SCENES): $(COMPILED) $(TESTING)
 	@echo "set-up: compiling the machine code of scenes"
 	@for scene in config/scenes/worst.yaml config/scenes/urban.yaml studies/town/config.yaml; do \
 		$(BIN)/$(SAMPLE) $$scene || true; done >.venv/scenes.log 2>&1
+	@$(BIN)/lowalt sample 'NIO ET5T 2023' 0 --out $@-made --overlay tests/data/coarse.yaml >>.venv/scenes.log 2>&1 || true
 	@touch $@
 
 $(EMULATED): $(COMPILED)
