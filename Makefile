@@ -11,6 +11,8 @@ COMPILED := .venv/set-up-compiled
 SETUP := .venv/set-up
 TESTING := .venv/set-up-tests
 BYTECODE := .venv/set-up-bytecode
+SCENES := .venv/set-up-scenes
+EMULATED := .venv/set-up-emulated
 DOCS := .venv/set-up-docs
 SNAKEMAKE := $(BIN)/snakemake --cores $(CORES)
 
@@ -45,7 +47,7 @@ $(BASE): pyproject.toml envs/constraints.txt
 		2>/dev/null || { $(PIP) -c envs/constraints.txt uv || true; }
 	@echo "set-up: installing the packages that make data"
 	@$(call install,-e '.[workflow$(comma)cost]' pip)
-	@rm -f $(TRAINING) $(COMPILED) $(SETUP) $(TESTING) $(DOCS) $(BYTECODE)
+	@rm -f $(TRAINING) $(COMPILED) $(SETUP) $(TESTING) $(DOCS) $(BYTECODE) $(SCENES) $(EMULATED)
 	@touch $@
 
 $(TRAINING): $(BASE)
@@ -64,7 +66,7 @@ $(SETUP): $(BASE)
 	@$(MAKE) --no-print-directory -j 2 $(TRAINING) $(COMPILED)
 	@touch $@
 
-$(TESTING): $(SETUP)
+$(TESTING): $(TRAINING)
 	@echo "set-up: installing the packages of the tests, the documents and the linters"
 	@$(call install,$(call of_extra,test) $(call of_extra,tensorboard) $(call of_extra,export) $(call of_extra,slurm) $(call of_extra,notebooks) $(call of_extra,methods) $(call of_extra,weights) $(call of_extra,town) $(call of_extra,tools) $(call of_extra,docs) $(call of_extra,lint))
 	@touch $@
@@ -74,6 +76,24 @@ $(TESTING): $(SETUP)
 $(BYTECODE): $(TESTING)
 	@echo "set-up: compiling the bytecode of the tests"
 	@$(BIN)/python -m pytest --collect-only -q >.venv/bytecode.log 2>&1 || true
+	@touch $@
+
+# The tests' own machine code is compiled while their bytecode is written: that of scenes, of a town and of an echo with a
+# tolerance, and that of the processors that tests emulate.
+SAMPLE = lowalt sample Owl 0 --raw cells --out $@-made --overlay
+SMALL = lowalt.shards.build --config config/default.yaml config/tiny.yaml tests/data/small.yaml --out $@-made
+$(SCENES): $(COMPILED) $(TESTING)
+	@echo "set-up: compiling the machine code of scenes"
+	@for scene in config/scenes/worst.yaml config/scenes/urban.yaml studies/town/config.yaml; do \
+		$(BIN)/$(SAMPLE) $$scene || true; done >.venv/scenes.log 2>&1
+	@$(BIN)/lowalt sample 'NIO ET5T 2023' 0 --out $@-made --overlay tests/data/coarse.yaml >>.venv/scenes.log 2>&1 || true
+	@touch $@
+
+$(EMULATED): $(COMPILED)
+	@echo "set-up: compiling the machine code of the processors that tests emulate"
+	@{ PYTHONPATH=tests/support $(BIN)/python -m emulation x86-64-v2 -m $(SMALL); \
+		PYTHONPATH=tests/support $(BIN)/python -m emulation avx2 -m $(SAMPLE) config/scenes/triangle.yaml; } \
+		>.venv/emulated.log 2>&1 || true
 	@touch $@
 
 $(DOCS): $(BASE)
@@ -103,13 +123,13 @@ real: $(SETUP)  ## real meshes and recordings: make real INPUTS=folder
 measured:  ## recordings held against their radars' twins: make measured INPUTS=folder of the measured sets
 	$(MAKE) --no-print-directory study NAME=measured
 
-ready: $(BYTECODE)
+ready: $(BYTECODE) $(SCENES) $(EMULATED)
 
 test:  ## the test suite
 	@$(MAKE) --no-print-directory -j 2 ready
 	$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder --strict-skips -m "not slow"
 
-test-slow: $(TESTING)  ## the slow checks
+test-slow: $(TESTING) $(COMPILED)  ## the slow checks
 	$(BIN)/python -m pytest -m slow
 
 # One process per reader; about ten minutes.

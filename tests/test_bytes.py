@@ -21,20 +21,14 @@ NAMES = [
     for name in EMULATED
 ]
 
-SMALL = """
-targets: {select: [DJI Mini 2, Owl, Audi A6L 2019, Running Pedestrian 1]}
-motion: {models: 1, models_per_chunk: 1}
-split: {by: motion, train: 1, val: 0, test: 0}
-shards: {kind: signal}
-"""
+SMALL = ("config/default.yaml", "config/tiny.yaml", "tests/data/small.yaml")
 
 
 def test_signals_of_a_small_data_set_are_those_of_another_processor(tmp_path):
     """Clouds, motion tables, shards, their tables and the index, on the processor that can do
     least.
     """
-    (tmp_path / "small.yaml").write_text(SMALL)
-    config = "--config", "config/default.yaml", "config/tiny.yaml", str(tmp_path / "small.yaml")
+    config = ("--config", *SMALL)
     build.main([*config, "--out", str(tmp_path / "here")])
     run("x86-64-v2", "-m", "lowalt.shards.build", *config, "--out", str(tmp_path / "there"))
     expected = manifest.text(tmp_path / "here")

@@ -24,17 +24,22 @@ case "$(basename "$0") $*" in
     *'"recognition"'*) echo torch ;;
     uv*torch*) test -z "$DOWNLOAD_UNTIL" || until_there "$DOWNLOAD_UNTIL" ;;
     lowalt*sample*) touch .venv/sampling
-        test -n "$DOWNLOAD_UNTIL" || until_there .venv/set-up-training ;;
+        test -n "$DOWNLOAD_UNTIL" || until_there "$COMPILE_UNTIL" ;;
     snakemake*prepared*) touch .venv/data-made ;;
 esac
 """
 
 
-def make(folder: Path, *targets: str, download_until: str = "") -> tuple[list[str], list[str]]:
+def make(
+    folder: Path,
+    *targets: str,
+    download_until: str = "",
+    compile_until: str = ".venv/set-up-training",
+) -> tuple[list[str], list[str]]:
     """What `make` and the programs that it starts print, and these programs, both line by line.
 
     download_until: the file that has to appear before the packages of training are there; without
-    it, machine code takes longer than they do.
+    it, machine code takes longer than they do, until `compile_until` is there.
     """
     log = folder / "log"
     log.unlink(missing_ok=True)
@@ -43,6 +48,7 @@ def make(folder: Path, *targets: str, download_until: str = "") -> tuple[list[st
         "HOME": str(folder),
         "LOG": str(log),
         "DOWNLOAD_UNTIL": download_until,
+        "COMPILE_UNTIL": compile_until,
     }
     run = subprocess.run(
         ["make", f"PYTHON={folder / 'python'}", *targets],
@@ -97,6 +103,14 @@ def test_set_up_alone_compiles_while_it_downloads(checkout):
     _, started = make(checkout, ".venv/set-up", download_until=".venv/sampling")
     assert (checkout / ".venv/set-up").is_file()
     assert not [line for line in started if line.startswith("snakemake")]
+
+
+def test_bytecode_of_tests_is_written_while_machine_code_is_compiled(checkout):
+    _, started = make(checkout, "-j2", "ready", compile_until=".venv/set-up-bytecode")
+    compiled = at(started, "lowalt sample DJI Mini 2")
+    overlays = ("urban.yaml", "town/config.yaml", "coarse.yaml")
+    for later in (*overlays, "emulation avx2", "emulation x86-64-v2"):
+        assert compiled < at(started, later)
 
 
 def test_a_finished_download_starts_no_run_of_its_own(checkout):

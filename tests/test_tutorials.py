@@ -93,7 +93,6 @@ def test_the_rain_of_the_tutorial_is_that_of_table_5_of_the_recommendation(gigah
 
 
 # The quick suite adds an effect to a copy of the tree in tests/test_contributing.py.
-@pytest.mark.slow
 # `lowalt explain` leaves out and adds every effect of the catalogue, in looks of 2048 sweeps.
 @pytest.mark.slow
 def test_an_effect(checkout, monkeypatch):

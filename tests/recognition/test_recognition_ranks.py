@@ -23,9 +23,14 @@ from trainings import SCHEME, SETTINGS, sources, with_training
 # One process imports torch, which takes seconds, and becomes two ranks by forks, with the variables
 # that torchrun sets. The slow tests below start them by torchrun itself.
 PROGRAM = """
-import json, os, sys, traceback
+import gc, json, os, sys, traceback
+
+gc.disable()
 import timm, torch
 from lowalt.recognition.__main__ import main
+
+gc.freeze()
+gc.enable()
 
 ranks = {}
 for rank in range(2):

@@ -61,3 +61,9 @@ def run(name: str, *arguments: str, threads: int = 1) -> str:
     )
     assert done.returncode == 0, done.stderr[-2000:]
     return done.stdout
+
+
+if __name__ == "__main__":
+    processor, *words = sys.argv[1:]
+    if able(processor):
+        run(processor, *words)

@@ -10,11 +10,15 @@ import re
 from pathlib import Path
 
 from snakemake.cli import main
+from snakemake.executors import touch
 
 import kept_records
 from lowalt.targets import records
 
 records.merge = kept_records.once(records.merge)
+# Snakemake waits before it touches a job's files, for the clocks of coarse file systems. Files are
+# touched in the order of their jobs, and equal times make nothing run again.
+touch.Executor.SLEEPING_TIME = 0.0
 
 
 def said(*arguments: str) -> str:

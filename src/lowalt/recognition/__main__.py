@@ -1,10 +1,12 @@
 """`python -m lowalt.recognition COMMAND`: from shards to models, predictions and tables."""
 
+import gc
 import json
 import sys
 from argparse import ArgumentParser, Namespace
 from functools import partial
 from pathlib import Path
+from types import ModuleType
 
 from lowalt.config.command import add_backbone_option, dispatch, parser, pick, run
 from lowalt.files.atomic import replacing
@@ -90,13 +92,22 @@ def _source(options: Namespace):
     return Source(made=partial(DatasetSamples, opened(options.dataset)))
 
 
+def _runs() -> ModuleType:
+    """Import the module that needs torch."""
+    # Looking for garbage among all that torch makes takes a quarter of its import.
+    gc.disable()
+    from lowalt.recognition import runs
+
+    gc.enable()
+    return runs
+
+
 def _train(arguments: list[str]) -> None:
     """Train one scheme in one protocol.
 
     Settings: scheme, seed, size, colour_map, network, training, augmentation, classes.
     """
-    from lowalt.recognition.runs import train
-
+    runs = _runs()
     line = parser("lowalt.recognition train", _train.__doc__)
     _add_source(line)
     line.add_argument("--protocol", required=True, choices=PROTOCOLS)
@@ -112,7 +123,8 @@ def _train(arguments: list[str]) -> None:
     scheme, settings = with_scheme(options.settings)
     pick(settings, "seed", "size", "colour_map", "network", "training", "augmentation", "classes")
     samples = _source(options).for_training(scheme, options.protocol, settings["size"])
-    train(samples, scheme, options.protocol, settings, Path(options.out), options.tensorboard)
+    out = Path(options.out)
+    runs.train(samples, scheme, options.protocol, settings, out, options.tensorboard)
 
 
 def _evaluate(arguments: list[str]) -> None:
@@ -120,8 +132,7 @@ def _evaluate(arguments: list[str]) -> None:
 
     Settings: batch, threads, precision, mirror.
     """
-    from lowalt.recognition.runs import evaluate, load
-
+    runs = _runs()
     line = parser("lowalt.recognition evaluate", _evaluate.__doc__)
     _add_source(line)
     line.add_argument("--model", required=True, help="model.safetensors of a training run")
@@ -136,11 +147,11 @@ def _evaluate(arguments: list[str]) -> None:
     )
     options = line.parse_args(arguments)
     source = _source(options)
-    trained = load(options.model, options.backbone)
+    trained = runs.load(options.model, options.backbone)
     samples = source.samples(
         trained.scheme.columns, evaluated_folds(trained.protocol), trained.size, placed=True
     )
-    evaluate(trained, samples, options.settings, options.out, options.trained_on)
+    runs.evaluate(trained, samples, options.settings, options.out, options.trained_on)
 
 
 def _tables(arguments: list[str]) -> None:

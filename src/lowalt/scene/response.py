@@ -127,7 +127,8 @@ def _amplitudes(view: View, factor: np.ndarray | float) -> np.ndarray:
     strength = scale * np.sqrt(view.cloud.rcs_m2) * np.asarray(factor, np.float64)
     strength = strength.reshape((1,) * (4 - strength.ndim) + strength.shape)
     shape = (*strength.shape[:2], *view.places.shape[:2])
-    return np.ascontiguousarray(np.broadcast_to(strength, shape))
+    # Always a copy: what is broadcast is read-only, for which numba would compile the loops again.
+    return np.broadcast_to(strength, shape).copy()
 
 
 def _half_diagonal(counts: np.ndarray) -> float:
