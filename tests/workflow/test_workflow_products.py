@@ -57,6 +57,9 @@ def test_a_job_reads_the_files_of_its_own_chunk_in_the_order_of_the_stations(fol
     noise = job_of(jobs, "noise", **chunk)
     assert noise.inputs["echoes"] == [f"{BASE}/echo/seen-00001/{name}.npy" for name in "ABCD"]
     assert noise.inputs["powers"] == []
+    # Reading a file of another chunk would need that chunk's jobs.
+    assert {job.wildcards.get("part", "00001") for job in jobs} == {"00001"}
+    assert {job.wildcards.get("group", "seen") for job in jobs} == {"seen"}
     assert job_of(jobs, "echo", station="B", **chunk).params["stations"] == ["B"]
     motion = job_of(jobs, "motion", **chunk)
     assert motion.params["span"] == ["--first", "50", "--count", "50"]
