@@ -117,7 +117,9 @@ def test_a_prediction_names_every_window_and_says_which_hold_a_target(tmp_path, 
     assert "3 of 3 windows hold a target: " in capsys.readouterr().out
 
 
-def test_clipped_and_lost_stretches_cost_their_own_windows_and_noise_is_nothing_there(tmp_path, capsys):
+def test_clipped_and_lost_stretches_cost_their_own_windows_and_noise_is_nothing_there(
+    tmp_path, capsys
+):
     path = drive(tmp_path, 44100, False)
     rate, values = wavfile.read(tmp_path / "drive.wav")
     values[20000:30000] = np.clip(4 * values[20000:30000].astype(int), -5500, 5500)
