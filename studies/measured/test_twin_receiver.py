@@ -20,11 +20,14 @@ from lowalt.extensions.recordings.twin_scenes import (
     MARGIN,
     Library,
     clouds_of,
+    heard,
     intervals,
     samples,
     stretch,
 )
 from lowalt.files.errors import InputError
+from lowalt.numerics.portable import rms
+from lowalt.numerics.streams import stream
 
 QUIET = {
     "snr_db": 80.0,
@@ -116,9 +119,28 @@ def test_simulated_windows_hold_a_target_where_a_receiver_can_hear_it(library):
     assert found.shape == (2, 2, 400) and len(names) == 2
     deaf = {**scene, "receiver": {**QUIET, "snr_db": -60.0}}
     quiet, _ = intervals(LOOKING, deaf, clouds, 1, ("here",), 2, 2)
-    power = [np.abs(np.fft.fft(many * np.hanning(400))) ** 2 for many in (found, quiet)]
-    over = [part.max(axis=-1) / np.median(part, axis=-1) for part in power]
-    assert (over[0] > 30).all() and (over[1] < 30).all()
+    without, _ = intervals(LOOKING, scene, clouds, 1, ("here",), 2, 2, quiet=True)
+    power = np.abs(np.fft.fft(np.stack([found, quiet, without]) * np.hanning(400))) ** 2
+    over = power.max(axis=-1) / np.median(power, axis=-1)
+    assert (over[0] > 30).all() and (over[1:] < 30).all()
+
+
+def test_a_second_target_has_its_level_and_a_place_of_its_own(library):
+    scene = library.scenes["cw_24ghz"]["Vehicle"][1]
+    clouds = clouds_of(library.records, scene["subtypes"], 1)
+    alone, both = (
+        heard(
+            LOOKING,
+            {**scene, "second": {"share": share, "level_db": -6.0}},
+            clouds,
+            stream(1, "scene"),
+            0.13,
+        )[0]
+        for share in (0.0, 1.0)
+    )
+    second = both - alone
+    assert rms(second) / rms(alone) == pytest.approx(10 ** (-6 / 20))
+    assert abs(np.vdot(second, alone)) < 0.5 * rms(second) * rms(alone) * len(alone)
 
 
 def test_a_longer_vehicle_keeps_round_wheels(library):

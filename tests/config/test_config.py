@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from lowalt.config.layers import canonical, check, load, load_yaml, merge
+from lowalt.config.schema import faults
 from lowalt.files import yaml_files
 from lowalt.files.errors import InputError
 from lowalt.motion import COLUMNS
@@ -77,6 +78,12 @@ def test_a_number_is_a_number_however_it_is_written(tmp_path):
         150,
     ]
     assert found["effects"] == {"cell_noise": {"snr_db": 20.0}} and found["run"] == "1e5"
+
+
+def test_text_that_a_pattern_describes_has_no_control_characters():
+    signs = [chr(code) for code in range(1000)]
+    refused = [ord(sign) for sign in signs if faults(sign, {"pattern": ""})]
+    assert refused == [*range(32), 127]
 
 
 @pytest.mark.parametrize(

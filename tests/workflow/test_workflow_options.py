@@ -120,9 +120,19 @@ def test_added_levels_are_the_settings_of_their_own_chunks():
     levels = set()
     for name in stages.run.plan.chunks:
         group, part = name.split("-", 1)
-        text = stages.noise.settings(SimpleNamespace(group=group, part=part))
-        levels.add(tuple(json.loads(text)["snr_db"]))
+        job = SimpleNamespace(group=group, part=part)
+        levels.add(tuple(json.loads(stages.noise.settings(job))["snr_db"]))
+        assert stages.noise.source(job) in stages.run.plan.sources
     assert levels == {(3, 8), (1.5,)}
+
+
+def test_a_shard_s_command_counts_the_pieces_of_its_fold_from_zero():
+    shards = stages_of({"shards": {"largest_mb": 100}}).shards
+    job = {"group": "seen", "part": "00001", "fold": "train"}
+    words = [shards.piece(SimpleNamespace(**job, piece=piece)) for piece in ("p0", "p1")]
+    assert [number for _, number, _ in words] == ["0", "1"]
+    alone = stages_of({"shards": {"largest_mb": 1e6}}).shards
+    assert alone.piece(SimpleNamespace(**job, piece="")) == []
 
 
 def test_companions_bring_their_clouds_once():

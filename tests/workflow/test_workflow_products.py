@@ -57,6 +57,9 @@ def test_a_job_reads_the_files_of_its_own_chunk_in_the_order_of_the_stations(fol
     noise = job_of(jobs, "noise", **chunk)
     assert noise.inputs["echoes"] == [f"{BASE}/echo/seen-00001/{name}.npy" for name in "ABCD"]
     assert noise.inputs["powers"] == []
+    # Reading a file of another chunk would need that chunk's jobs.
+    assert {job.wildcards.get("part", "00001") for job in jobs} == {"00001"}
+    assert {job.wildcards.get("group", "seen") for job in jobs} == {"seen"}
     assert job_of(jobs, "echo", station="B", **chunk).params["stations"] == ["B"]
     motion = job_of(jobs, "motion", **chunk)
     assert motion.params["span"] == ["--first", "50", "--count", "50"]
@@ -77,12 +80,13 @@ def test_a_job_reads_the_files_of_its_own_chunk_in_the_order_of_the_stations(fol
 
 @pytest.mark.workflow
 def test_what_is_prepared_is_all_that_trainings_and_the_page_wait_for(folder):
-    jobs = planned(folder, {}, "prepared", f"{BASE}/report.html")
+    jobs = planned(folder, {"recognition": {"seeds": [4]}}, "prepared", f"{BASE}/report.html")
     prepared = {*job_of(jobs, "prepared").files}
     trained = set()
     for job in jobs:
         if job.rule == "train":
             trained |= {*job.inputs["views"], *job.inputs["frozen"]}
+            assert json.loads(job.params["settings"])["seed"] == 4
     assert len(trained) > 10 and trained <= prepared
     assert {*job_of(jobs, "report").inputs["distances"]} <= prepared
     # Times are not measured while packages are fetched.

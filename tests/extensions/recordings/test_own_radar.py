@@ -17,7 +17,7 @@ from lowalt.extensions.recordings.own_radar import calibrated, snr_range, temper
 from lowalt.extensions.recordings.record import read_record, record
 from lowalt.extensions.recordings.twin import twin_of
 from lowalt.extensions.recordings.twin_scenes import Library
-from lowalt.extensions.recordings.twin_training import settings, train
+from lowalt.extensions.recordings.twin_training import settings, simulated, train
 from lowalt.extensions.recordings.window_samples import Windows, facts
 from lowalt.files.errors import InputError
 from lowalt.files.yaml_files import load_yaml
@@ -214,6 +214,19 @@ def test_settings_hold_no_folder_of_this_machine_in_any_folder(tmp_path, monkeyp
     at_home = settings()
     monkeypatch.chdir(tmp_path)
     assert settings() == at_home and at_home["table"] == "config/schemes.csv"
+
+
+def test_no_two_folds_classes_or_scenes_share_a_draw_and_what_was_drawn_is_found_again(tmp_path):
+    hover = {"subtypes": ["Crow"], "course": "hover", "distance_m": [2, 10], "height_m": 0}
+    hover |= {"sway_m": 0, "sway_hz": 1, "rock_deg": 0}
+    about = stated(tmp_path, classes=["Bird", "UAV"], scenes={"Bird": [hover] * 2, "UAV": [hover]})
+    library = Library.of({"mine": (about, twin_of(about, 12000), [20.0, 30.0])})
+    block = settings(over={"echoes": {"train": 2, "validation": 2}, "receivers": 2})
+    drawn = []
+    for fold in [*block["echoes"]] * 2:
+        drawn.append(simulated(library, "mine", block, fold, ("Bird", "UAV"), tmp_path).images)
+    np.testing.assert_array_equal(drawn[:2], drawn[2:])
+    assert len(np.unique(np.concatenate(drawn[:2]), axis=0)) == 2 * 2 * 2 * 2
 
 
 def test_a_network_is_trained_in_any_folder(tmp_path, monkeypatch):

@@ -61,12 +61,14 @@ def test_what_predict_answers_of_windows_with_a_target_is_of_their_tracks(tmp_pa
     line = np.cos(2 * np.pi * 960.0 * time) * ((time >= 4.0) & (time < 8.0))
     hum = np.cos(2 * np.pi * 300.0 * time)
     samples = 3000 * line + 200 * hum + rng.normal(0, 90, len(time))
+    samples[(time >= 12.0) & (time < 14.8)] = 0
     wavfile.write(tmp_path / "a.wav", rate, samples.astype("i2"))
     about = record(
         {"file": "a.wav", "carrier_hz": 24e9, "channel": "real", "label": "Vehicle"}, tmp_path, "a"
     )
     trained, settings = opened("cw_24ghz")
-    shares = np.tile([0.02, 0.02, 0.94, 0.02], (60, 1))
+    shares = np.tile([0.997, 0.001, 0.001, 0.001], (60, 1))
+    shares[10:20] = [0.02, 0.02, 0.94, 0.02]
     odd = 14
     shares[odd] = [0.94, 0.02, 0.02, 0.02]
     monkeypatch.setattr(answers, "probabilities", lambda *_: shares)
@@ -80,7 +82,8 @@ def test_what_predict_answers_of_windows_with_a_target_is_of_their_tracks(tmp_pa
     monkeypatch.setattr(answers, "rendered", noted)
     found = answers.answers(trained, settings, about, "a")
     assert found.present.nonzero()[0].tolist() == list(range(10, 20))
-    assert set(found.outcomes(list(trained.classes))) == {"nothing", "Vehicle"}
+    assert set(found.outcomes(list(trained.classes))) == {"nothing", "Vehicle", "lost"}
+    assert found.lost.nonzero()[0].tolist() == list(range(30, 37))
     # The network sees the line of 960 Hz, but not the hum of 300 Hz; a cell is 2.5 Hz wide.
     power = np.median(np.abs(np.fft.fft(seen[0][10:20], axis=1)) ** 2, axis=0)
     around = np.median(power[100:500])
