@@ -332,8 +332,10 @@ class SceneSample:
         """
         if self.view.station.transmitter is not None:
             return False
-        changing = [effect for effect in self.scene.effects if not effect.offers("cross_sections")]
-        return all(effect.place == "motion" for effect in changing)
+        return all(
+            effect.place == "motion" or effect.offers("cross_sections")
+            for effect in self.scene.effects
+        )
 
     def received(self) -> Received:
         """Return the sample's signal, the chosen range cells and the reference power."""
@@ -467,7 +469,7 @@ def scene_signals(
     name: str,
     clouds: Mapping[str, Cloud],
     rows: list[dict],
-    occluders: Mapping[str, dict] | None = None,
+    occluders: Mapping[str, dict] | None,
     snrs: list[float] | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return signals (models, N) complex64 at a station, and reference powers (models,) W.

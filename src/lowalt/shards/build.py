@@ -51,10 +51,10 @@ def write_run(dataset: Dataset, folder: str | Path, kind: str, clouds: bool = Tr
 def rows_of(dataset: Dataset, chunk: str) -> list[dict]:
     """Return the motion table of one chunk."""
     group, _, _ = chunk.partition("-")
-    first, count = dataset.plan.span(chunk)
+    held = dataset.plan.chunk(chunk)
     rows = []
-    for model in range(first, first + count):
-        for subtype in dataset.plan.chunk(chunk).members:
+    for model in range(held.first, held.first + held.count):
+        for subtype in held.members:
             rows.append(dataset.row(Place(group, subtype, model, 0.0)))
     return rows
 

@@ -176,7 +176,7 @@ class Renderer:
         setting = self.spectra[name]
         kind = spectrum(name)
         if isinstance(signal, Cube):
-            kind.fill_cells(signal, setting, plan.values)
+            plan.values[:] = kind.definition(signal, setting)
         elif self.spectra.times == "even" or even(signal, late):
             re = np.ascontiguousarray(signal.real)
             im = np.ascontiguousarray(signal.imag)
