@@ -1,4 +1,7 @@
-"""The metadata block at the head of a data card: licence, protocols and shards, as hubs read it."""
+"""The metadata block at the head of a data card: licence, protocols and shards, as hubs read it.
+
+Cards of models share its tags and its tables.
+"""
 
 import json
 from collections.abc import Iterator
@@ -16,6 +19,14 @@ from lowalt.shards.sample_table import EXTENSIONS
 from lowalt.shards.stored_cubes import cell_type_of
 
 TAGS = ["radar", "integrated-sensing-and-communication", "micro-doppler", "webdataset", "synthetic"]
+
+
+def markdown_table(header: tuple[str, ...], rows: list[tuple]) -> str:
+    """Return a Markdown table."""
+    text = ""
+    for line in (header, ("---",) * len(header), *rows):
+        text += "| " + " | ".join(map(str, line)) + " |\n"
+    return text
 
 
 def patterns(shards: ShardSet, group: str, fold: str) -> list[str]:
