@@ -1,29 +1,32 @@
 """Recognition accuracy against computing time: trained schemes, and networks that were only timed.
 
-    python -m lowalt.measure.accuracy_cost --settings JSON --predictions a.csv ... --speeds a.json
-    ...
-        --data-jobs a.jsonl ... --index index.json --presets presets.csv --out accuracy_cost.csv
+    python -m lowalt.measure.accuracy_cost --settings JSON --predictions a.csv ...
+        --speeds a.json ... --data-jobs a.jsonl ... --index index.json --presets presets.csv
+        --out accuracy_cost.csv
 
 Settings: seed. accuracy_cost.csv, one row per scheme, accuracies averaged over the SNRs and the
 training seeds:
     kind                 trained: accuracy and times measured; timed: times of a network that was
-    not trained, without
-                         accuracy, its core_s_training extrapolated from the time of one step
+                         not trained, without accuracy, its core_s_training extrapolated from the
+                         time of one step
     preset, command      name of a preset and the command that runs it
-    backbone, pixels, stations, spectra, steps, train_samples, parameters    of the scheme
+    backbone, pixels, stations, spectra, steps, train_samples, parameters
+                         of the scheme
     seen_percent         held-out motion models of the trained subtypes
     unseen_percent       subtypes never trained on; macro_f1_low, macro_f1_high: 95 % interval of
-    its macro F1 difference_points    unseen less that of the first scheme; low, high: its 95 %
-    interval, which resamples training
-                         seeds, subtypes and motion models
-    inference_ms_1, inference_ms_64    of one sample on one core in batches of 1 and 64, images in
-    memory train_ms             of one sample of a training step on one core, images in memory
+                         its macro F1
+    difference_points    unseen less that of the first scheme; low, high: its 95 % interval, which
+                         resamples training seeds, subtypes and motion models
+    inference_ms_1, inference_ms_64
+                         of one sample on one core in batches of 1 and 64, images in memory
+    train_ms             of one sample of a training step on one core, images in memory
     core_s_data          processor time of making the samples trained on: all spectra at the
-    stations that are seen core_s_training      processor time of the whole training, validation
-    included network_bytes        bytes of images per sample that the network takes in
+                         stations that are seen
+    core_s_training      processor time of the whole training, validation included
+    network_bytes        bytes of images per sample that the network takes in
     seeds, spread_points training seeds, and the standard deviation of unseen accuracy between them
     front                Pareto front: no other row is more accurate on unseen subtypes in equal or
-    less time
+                         less time
 """
 
 import json
