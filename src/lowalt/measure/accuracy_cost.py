@@ -40,6 +40,8 @@ from lowalt.config.network import station_names
 from lowalt.files.atomic import text_of
 from lowalt.files.csv_tables import read_csv, short, write_csv
 from lowalt.files.errors import InputError
+from lowalt.files.json_objects import read_object
+from lowalt.machine.job_times import job_times
 from lowalt.numerics.streams import stream
 from lowalt.recognition.evaluated import Evaluated, difference
 from lowalt.recognition.schemes import SPECTRA, TABLE, joined, named, names
@@ -130,13 +132,7 @@ def sample_seconds(paths: list[str | Path], samples: int) -> float:
     paths: Snakemake's benchmark files (JSON lines, extended). Raises: InputError for a file that is
     none.
     """
-    total = 0.0
-    for path in paths:
-        try:
-            total += float(json.loads(text_of(path, "benchmark").splitlines()[-1])["cpu_time"])
-        except (ValueError, IndexError, KeyError, TypeError) as error:
-            raise InputError(f"{path}: not an extended benchmark file ({error!r})") from error
-    return total / samples
+    return sum(job_times(path).processor_s for path in paths) / samples
 
 
 def _average(runs: list[Evaluated], part: str, seed: int) -> dict:
@@ -237,7 +233,7 @@ def main(arguments: list[str]) -> None:
     line.add_argument("--out", required=True, help="table to write (.csv)")
     options = line.parse_args(arguments)
     (seed,) = pick(options.settings, "seed")
-    index = json.loads(text_of(options.index, "index"))
+    index = read_object(options.index, "an index of shards")
     presets = read_csv(options.presets, *PRESETS)
     studies = {row["predictions"]: row["scheme"] for row in presets if row["predictions"]}
     by_name: dict[str, list[Evaluated]] = {}
