@@ -42,10 +42,9 @@ def write_run(dataset: Dataset, folder: str | Path, kind: str, clouds: bool = Tr
     for chunk in plan.chunks:
         written += write_chunk(dataset, folder, chunk, kind)
         print(f"{chunk}: written", file=sys.stderr)
-    render = {key: dataset.config[key] for key in ("network", "spectra", "images")}
-    return build(
-        written, render, folder / "shards" / "index.json", dataset.maker.echo, dataset.classes
-    )
+    maker = dataset.maker
+    out = folder / "shards" / "index.json"
+    return build(written, maker.render, out, maker.echo, dataset.classes)
 
 
 def rows_of(dataset: Dataset, chunk: str) -> list[dict]:
@@ -89,8 +88,8 @@ def write_chunk(dataset: Dataset, folder: Path, chunk: str, kind: str) -> list[P
     effects = maker.echo["effects"]
     if kind == "recipe":
         refuse(effects)
-    if kind == "recipe" and effects:
-        powers = np.concatenate([maker.received(row)[1] for row in rows], axis=1)
+        if effects:
+            powers = np.concatenate([maker.received(row)[1] for row in rows], axis=1)
 
     samples = ChunkSamples(
         rows,

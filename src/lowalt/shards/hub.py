@@ -7,6 +7,7 @@ import json
 from collections.abc import Iterator
 from fnmatch import fnmatchcase
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -111,15 +112,12 @@ def features(shards: ShardSet) -> list[dict]:
     for field in record["struct"]:
         if field["name"] == "label":
             field["dtype"] = {"class_label": {"names": classes}}
-    # The type of an array is one nested list per axis.
-    if shards.kind == "image":
-        data: dict = {"dtype": "image"}
-    elif shards.kind != "cube":
-        data = {"list": {"list": {"list": "float32"}}}
-    elif cell_type_of(first) == "int16":
-        data = {"list": {"list": {"list": {"list": "int16"}}}}
-    else:
-        data = {"list": {"list": {"list": {"list": "float32"}}}}
+    data: Any = {"dtype": "image"}
+    if shards.kind != "image":
+        data = "int16" if cell_type_of(first) == "int16" else "float32"
+        # The type of an array is one nested list per axis; a cube has an axis of range cells too.
+        for _ in range(4 if shards.kind == "cube" else 3):
+            data = {"list": data}
     return [
         column("__key__", "string"),
         column("__url__", "string"),

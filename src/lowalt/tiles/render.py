@@ -53,10 +53,9 @@ class Renderer:
 
     Three stations' tones:
 
+        >>> from lowalt.config.blocks import render_blocks
         >>> from lowalt.config.layers import overlaid
-        >>> config = overlaid([])
-        >>> parts = ("network", "spectra", "images")
-        >>> renderer = Renderer.from_settings({key: config[key] for key in parts})
+        >>> renderer = Renderer.from_settings(render_blocks(overlaid([])))
         >>> signals = np.exp(0.8j * np.arange(1200).reshape(3, 400))
         >>> tile = renderer.tile(signals.astype(np.complex64))
         >>> tile.shape, split(tile, spectra=3).shape
