@@ -13,6 +13,7 @@ import pytest
 from lowalt.files.package_plan import EXTENSIONS, ROOMS
 
 ROOT = Path(__file__).parent.parent
+PACKAGE = ROOT / "src/lowalt"
 EFFECT = '''"""DC offset: the mixer's own oscillator leaks into its output and adds a constant to every sample."""
 
 import numpy as np
@@ -227,6 +228,20 @@ def test_every_path_and_module_that_a_document_names_exists(name):
     assert paths or modules
 
 
+def test_paths_of_the_table_of_changes_are_of_the_checkout_or_of_the_package():
+    """Those that begin with no folder of the checkout are relative to the package."""
+    text = (ROOT / "CONTRIBUTING.md").read_text()
+    table = text.partition("## Where do I change")[2].partition("## Tests")[0]
+    paths = set(re.findall(r"`([a-z_]+/[a-z_./]+)`", table))
+    wrong = []
+    for path in paths:
+        base = ROOT if (ROOT / path.partition("/")[0]).is_dir() else PACKAGE
+        if not (base / path).exists():
+            wrong.append(path)
+    assert len(paths) > 30
+    assert not wrong
+
+
 def test_every_name_in_the_list_of_words_stands_in_the_code():
     source = "\n".join(path.read_text() for path in (ROOT / "src").rglob("*.py"))
     known = set(re.findall(r"[A-Za-z_]\w+", source + (ROOT / "config/default.yaml").read_text()))
@@ -244,9 +259,6 @@ def test_every_name_in_the_list_of_words_stands_in_the_code():
     }
     assert len(rows) > 30 and len(named) > 30
     assert not named - known - {"py", "RUN"}
-
-
-PACKAGE = ROOT / "src/lowalt"
 
 
 def test_every_folder_is_described_once_with_files_to_begin_with():

@@ -36,6 +36,7 @@ from methods import CHOSEN_ON, KEPT, METHODS, SEEDLESS, Given
 from signals import cost_s
 
 import trainings
+from lowalt.config.blocks import render_blocks
 from lowalt.config.command import run
 from lowalt.extensions.benchmark import baseline_table, scoring
 from lowalt.extensions.benchmark.benchmark_tracks import TRACKS, UNKNOWN, Track, named
@@ -274,10 +275,7 @@ def confirmed_by_zoo(name: str, method: str, data: str, zoo: Path) -> Confirmed:
     entry = ZOO_ENTRIES[name, method]
     track = named(name)
     model = place(method, name, 0) / "model.safetensors"
-    config = config_of(MAIN)
-    content = replace(
-        model_file.of_run(model), input={block: config[block] for block in model_file.INPUT}
-    )
+    content = replace(model_file.of_run(model), input=render_blocks(config_of(MAIN)))
     keep(content, model, TrackSamples(track, "validation", data), entry, zoo)
     return confirm(zoo / f"{entry}.safetensors", track)
 

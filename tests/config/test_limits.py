@@ -184,7 +184,8 @@ def test_at_the_schemas_most_motion_models_keys_and_parts_keep_their_digits(publ
     motion = load_yaml(SCHEMA)["properties"]["motion"]["properties"]
     most = motion["models"]["maximum"]
     plan = Plan.of(config_of(most, 10), published)
-    assert plan.chunks[-1] == "unseen-99999" and plan.span(plan.chunks[-1]) == (most - 10, 10)
+    last = plan.chunk(plan.chunks[-1])
+    assert (last.name, last.first, last.count) == ("unseen-99999", most - 10, 10)
     assert {len(name.partition("-")[2]) for name in plan.chunks} == {5}
     keys = [
         sample_key(name, most - 1, snr) for name in published for snr in (-60.0, 3.5, float("inf"))

@@ -103,7 +103,8 @@ def written(folder, predictions, speeds, presets=()):
     (folder / "presets.csv").write_text(
         "\n".join((",".join(accuracy_cost.PRESETS), *presets)) + "\n"
     )
-    (folder / "job.jsonl").write_text('{"cpu_time": 1}\n{"cpu_time": 5.5}\n')
+    runs = [{"rule_name": "echo", "s": 6, "cpu_time": cpu_s, "max_rss": None} for cpu_s in (1, 5.5)]
+    (folder / "job.jsonl").write_text("".join(f"{json.dumps(run)}\n" for run in runs))
     stations = {name: {"position_m": [0, 0, 25], "normal_deg": 0} for name in "ABC"}
     shards = [{"samples": 4}, {"samples": 7}]
     (folder / "index.json").write_text(
@@ -236,6 +237,10 @@ def test_trainings_presets_and_measurements_that_do_not_fit_are_refused(tmp_path
         written(tmp_path, [base], [str(tmp_path / "bad.json")])
     with pytest.raises(InputError, match=r"bad\.json: not an extended benchmark file"):
         accuracy_cost.sample_seconds([tmp_path / "bad.json"], 1)
+    # A job that ended before Snakemake first measured it.
+    short = {"rule_name": "echo", "s": 0.1, "cpu_time": "NA", "max_rss": None}
+    (tmp_path / "short.jsonl").write_text(json.dumps(short) + "\n")
+    assert accuracy_cost.sample_seconds([tmp_path / "short.jsonl"], 1) == 0
     assert not (tmp_path / "out.csv").exists()
 
 

@@ -26,6 +26,7 @@ from lowalt.motion.drawing import region_polygon
 from lowalt.motion.table import SCALE
 from lowalt.motion.track_files import path_of
 from lowalt.motion.tracks import TURN_RADPS, Cell, drawn_path, model_rows
+from lowalt.shards.build import rows_of
 from lowalt.shards.dataset import Dataset, Place
 from lowalt.shards.sample_record import record, row_of
 from lowalt.shards.write import select
@@ -223,16 +224,8 @@ def test_a_track_is_in_one_fold_whole(dataset):
     assert Counter(held[0] for held in folds.values()) == {"train": 8, "val": 4, "test": 4}
     # Shards are dealt by the motion tables; the plan names a shard for each fold that has a sample.
     for chunk in plan.chunks:
-        (first, count), names, group = (
-            plan.span(chunk),
-            plan.chunk(chunk).members,
-            chunk.partition("-")[0],
-        )
-        rows = [
-            dataset.row(Place(group, name, model, 3.0))
-            for model in range(first, first + count)
-            for name in names
-        ]
+        group, _, _ = chunk.partition("-")
+        rows = rows_of(dataset, chunk)
         assert plan.folds(chunk) == list(FOLDS)
         chosen = [
             (fold, rows[number])

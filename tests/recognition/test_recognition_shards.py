@@ -291,7 +291,7 @@ def test_reduced_images_of_another_size_chunk_or_snr_are_refused_by_name(dataset
             24,
             SNRS,
             ["--reduced", str(tmp_path / "tiles.npz"), *options[2:]],
-            r"tiles\.npz: not reduced images",
+            r"tiles\.npz: an archive of arrays, expected reduced images",
         ),
     ):
         with pytest.raises(InputError, match=words):

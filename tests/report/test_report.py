@@ -61,7 +61,7 @@ def test_a_manifest_names_each_file_once_and_a_wrong_one_is_refused(tmp_path, ba
         with pytest.raises(InputError, match=r"report\.json: .*" + words):
             Inputs.read(path)
     path.write_text("{")
-    with pytest.raises(InputError, match=r"report\.json: not JSON"):
+    with pytest.raises(InputError, match=r"report\.json: not a manifest"):
         Inputs.read(path)
 
 

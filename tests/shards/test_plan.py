@@ -88,7 +88,7 @@ def test_a_step_moves_no_chunk_that_was_there(config):
         }
         assert set(before.shards) < set(after.shards)
     more = Plan.of(merge(config, {"motion": {"models": 40}}) | {"added": STEPS}, PUBLISHED)
-    whole = {name for name in plans[-1].chunks if plans[-1].span(name)[1] == 10}
+    whole = {name for name in plans[-1].chunks if plans[-1].chunk(name).count == 10}
     assert {plans[-1].chunk(name) for name in whole} < {more.chunk(name) for name in more.chunks}
 
 

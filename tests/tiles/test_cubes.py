@@ -172,11 +172,6 @@ def test_a_range_doppler_map_peaks_at_the_range_and_folded_speed_of_an_echo():
         speeds = -np.fft.fftshift(np.fft.fftfreq(512, interval_s))[::-1] * wavelength_m / 2
         assert row == 4 + 2 and abs(speeds[column] - folded) < 2 * fold / 512
         assert 2.7 < found.max() <= 3.001  # between two speeds a Hann window loses up to a tenth
-    out = np.empty((9, 512), np.float32)
-    range_doppler.fill_cells(
-        Cube(held, np.full(symbols, 20), np.zeros((symbols, len(TRUTH)))), settings, out
-    )
-    np.testing.assert_allclose(out, found, rtol=1e-6)
 
 
 def test_a_range_profile_is_the_mean_power_around_the_chosen_cells():
@@ -191,9 +186,6 @@ def test_a_range_profile_is_the_mean_power_around_the_chosen_cells():
                 for n in range(column, column + settings.window)
             ]
             np.testing.assert_allclose(found[:, column] ** 2, np.mean(powers, axis=0), rtol=1e-5)
-        out = np.empty(found.shape, np.float32)
-        hrrp.fill_cells(cube, settings, out)
-        np.testing.assert_allclose(out, found, rtol=1e-6)
 
 
 def test_axes_are_metres_and_metres_a_second(dataset):

@@ -1,6 +1,7 @@
 """Images of spectra: the resampling kernel, the scales, the fused renderer, PNG, commands."""
 
 import json
+import re
 import zipfile
 import zlib
 
@@ -233,10 +234,15 @@ def test_tiles_file_keeps_every_image(tmp_path):
         tile_files.Tiles(tmp_path / "bad.npz")
 
 
-def test_signals_of_other_symbols_than_the_network_s_are_refused_and_nothing_is_left(tmp_path):
-    np.save(tmp_path / "noisy.npy", np.zeros((2, 2, 3, 300), np.complex64))
+@pytest.mark.parametrize(
+    ("symbols", "save", "name"),
+    [(300, np.save, "noisy.npy"), (NETWORK["symbols"], np.savez, "noisy.npz")],
+    ids=["other symbols than the network's", "an archive of arrays"],
+)
+def test_signals_that_do_not_fit_are_refused_and_nothing_is_left(symbols, save, name, tmp_path):
+    save(tmp_path / name, np.zeros((2, 2, 3, symbols), np.complex64))
     block = json.dumps({"network": NETWORK, "spectra": SPECTRA, "images": IMAGES})
     out = tmp_path / "chunk.npz"
-    with pytest.raises(InputError, match=r"noisy\.npy"):
-        main(words(settings=block, signals=tmp_path / "noisy.npy", out=out))
+    with pytest.raises(InputError, match=re.escape(name)):
+        main(words(settings=block, signals=tmp_path / name, out=out))
     assert not out.exists()

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from lowalt.commands.command_line import Answer, add_command
+from lowalt.config.blocks import render_blocks
 from lowalt.config.layers import merge, overlaid
 from lowalt.files.atomic import write_file
 from lowalt.files.errors import InputError
@@ -151,7 +152,7 @@ def _shown(
     from lowalt.config.network import Network
     from lowalt.tiles import Renderer
 
-    blocks = {key: config[key] for key in ("network", "spectra", "images")}
+    blocks = render_blocks(config)
     whole = Renderer.from_settings(blocks)
     network = Network.from_settings(config["network"])
     seen = dataclasses.replace(network, stations=tuple(network.station(name) for name in stations))

@@ -5,6 +5,7 @@ import sys
 from pathlib import Path
 
 from lowalt.commands.command_line import Answer, add_command
+from lowalt.config.blocks import render_blocks
 from lowalt.config.command import add_backbone_option
 from lowalt.config.extensions import module_offered, offered
 from lowalt.config.layers import overlaid
@@ -74,7 +75,7 @@ def run(options: argparse.Namespace) -> Answer:
         )
     if config or not settings:
         config = config or overlaid([])
-        settings = {key: config[key] for key in ("network", "spectra", "images")}
+        settings = render_blocks(config)
     shares = predict(model, options.input, settings)
     best_first = sorted(shares.items(), key=lambda pair: -pair[1])
     lines = [f"{100 * share:6.2f} %  {name}" for name, share in best_first]

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from lowalt.commands.command_line import Answer, add_command
+from lowalt.config.blocks import render_blocks
 from lowalt.config.layers import overlaid
 from lowalt.machine.hardware import describe
 from lowalt.machine.timing import median_s
@@ -30,9 +31,7 @@ def facts(config: dict) -> list[dict]:
 
     They are its size, the index of zero, the time of an image, its settings and its source.
     """
-    renderer = Renderer.from_settings(
-        {key: config[key] for key in ("network", "spectra", "images")}
-    )
+    renderer = Renderer.from_settings(render_blocks(config))
     symbols = renderer.network.symbols
     signal = normalised(np.exp(0.1j * np.arange(symbols) ** 1.5).astype(np.complex64))
     if renderer.spectra.times == "known":

@@ -26,3 +26,8 @@ def motion_block(config: dict) -> dict:
         return motion
     network = config["network"]
     return motion | {"look_s": network["symbols"] * network["symbol_interval_s"]}
+
+
+def render_blocks(config: dict) -> dict:
+    """Return the blocks of a configuration that say how signals become images."""
+    return {name: config[name] for name in ("network", "spectra", "images")}

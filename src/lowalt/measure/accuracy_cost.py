@@ -1,29 +1,32 @@
 """Recognition accuracy against computing time: trained schemes, and networks that were only timed.
 
-    python -m lowalt.measure.accuracy_cost --settings JSON --predictions a.csv ... --speeds a.json
-    ...
-        --data-jobs a.jsonl ... --index index.json --presets presets.csv --out accuracy_cost.csv
+    python -m lowalt.measure.accuracy_cost --settings JSON --predictions a.csv ...
+        --speeds a.json ... --data-jobs a.jsonl ... --index index.json --presets presets.csv
+        --out accuracy_cost.csv
 
 Settings: seed. accuracy_cost.csv, one row per scheme, accuracies averaged over the SNRs and the
 training seeds:
     kind                 trained: accuracy and times measured; timed: times of a network that was
-    not trained, without
-                         accuracy, its core_s_training extrapolated from the time of one step
+                         not trained, without accuracy, its core_s_training extrapolated from the
+                         time of one step
     preset, command      name of a preset and the command that runs it
-    backbone, pixels, stations, spectra, steps, train_samples, parameters    of the scheme
+    backbone, pixels, stations, spectra, steps, train_samples, parameters
+                         of the scheme
     seen_percent         held-out motion models of the trained subtypes
     unseen_percent       subtypes never trained on; macro_f1_low, macro_f1_high: 95 % interval of
-    its macro F1 difference_points    unseen less that of the first scheme; low, high: its 95 %
-    interval, which resamples training
-                         seeds, subtypes and motion models
-    inference_ms_1, inference_ms_64    of one sample on one core in batches of 1 and 64, images in
-    memory train_ms             of one sample of a training step on one core, images in memory
+                         its macro F1
+    difference_points    unseen less that of the first scheme; low, high: its 95 % interval, which
+                         resamples training seeds, subtypes and motion models
+    inference_ms_1, inference_ms_64
+                         of one sample on one core in batches of 1 and 64, images in memory
+    train_ms             of one sample of a training step on one core, images in memory
     core_s_data          processor time of making the samples trained on: all spectra at the
-    stations that are seen core_s_training      processor time of the whole training, validation
-    included network_bytes        bytes of images per sample that the network takes in
+                         stations that are seen
+    core_s_training      processor time of the whole training, validation included
+    network_bytes        bytes of images per sample that the network takes in
     seeds, spread_points training seeds, and the standard deviation of unseen accuracy between them
     front                Pareto front: no other row is more accurate on unseen subtypes in equal or
-    less time
+                         less time
 """
 
 import json
@@ -37,6 +40,8 @@ from lowalt.config.network import station_names
 from lowalt.files.atomic import text_of
 from lowalt.files.csv_tables import read_csv, short, write_csv
 from lowalt.files.errors import InputError
+from lowalt.files.json_objects import read_object
+from lowalt.machine.job_times import job_times
 from lowalt.numerics.streams import stream
 from lowalt.recognition.evaluated import Evaluated, difference
 from lowalt.recognition.schemes import SPECTRA, TABLE, joined, named, names
@@ -127,13 +132,7 @@ def sample_seconds(paths: list[str | Path], samples: int) -> float:
     paths: Snakemake's benchmark files (JSON lines, extended). Raises: InputError for a file that is
     none.
     """
-    total = 0.0
-    for path in paths:
-        try:
-            total += float(json.loads(text_of(path, "benchmark").splitlines()[-1])["cpu_time"])
-        except (ValueError, IndexError, KeyError, TypeError) as error:
-            raise InputError(f"{path}: not an extended benchmark file ({error!r})") from error
-    return total / samples
+    return sum(job_times(path).processor_s for path in paths) / samples
 
 
 def _average(runs: list[Evaluated], part: str, seed: int) -> dict:
@@ -234,7 +233,7 @@ def main(arguments: list[str]) -> None:
     line.add_argument("--out", required=True, help="table to write (.csv)")
     options = line.parse_args(arguments)
     (seed,) = pick(options.settings, "seed")
-    index = json.loads(text_of(options.index, "index"))
+    index = read_object(options.index, "an index of shards")
     presets = read_csv(options.presets, *PRESETS)
     studies = {row["predictions"]: row["scheme"] for row in presets if row["predictions"]}
     by_name: dict[str, list[Evaluated]] = {}

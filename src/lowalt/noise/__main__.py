@@ -3,7 +3,6 @@
 Echoes are given in a file per station.
 """
 
-import functools
 import sys
 
 import numpy as np
@@ -73,9 +72,9 @@ def main(arguments: list[str]) -> None:
     filters = given.settings.pop("filters", None)
     filtered = None
     if filters:
-        from lowalt.scene.set_noise import behind
+        from lowalt.scene.set_noise import filtering
 
-        filtered = functools.partial(behind, filters=filters)
+        filtered = filtering(filters)
     seed, stations, snrs = pick(given.settings, "seed", "stations", "snr_db")
     rows = read_table(given.motion)
     echoes = load_echoes(given.echoes, stations, len(rows), len(snrs))

@@ -228,9 +228,7 @@ def _distances(arguments: list[str]) -> None:
 
 
 def _score(arguments: list[str]) -> None:
-    """Score a prediction file on a protocol's test part, with the labels of the shards. Settings:
-    none ({}).
-    """
+    """Score a prediction file on a protocol's test part by the shards' labels. Settings: none ({})."""
     from lowalt.recognition.score import score
 
     line = parser("lowalt.recognition score", _score.__doc__)

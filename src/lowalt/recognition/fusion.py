@@ -2,11 +2,9 @@
 
 Attention is the paper's proposal, mean its baseline.
 Axes: B samples, K stations, V views of a station, then features. A fusion offers
-    forward        tokens (B, K, V, features) -> fused feature (B, width)
-    decided        tokens and the classifier -> logits (B, classes)
-    each_station   tokens (B, K, V, features) -> tokens of B * K samples, each as if one station
-                   were the only one
-    both           the logits of all stations together, and of each alone
+    forward    tokens (B, K, V, features) -> fused feature (B, width)
+    decided    tokens and the classifier -> logits (B, classes)
+    both       the logits of all stations together, and of each as if it were the only one
 """
 
 from collections.abc import Callable
@@ -52,16 +50,14 @@ class Fusion(nn.Module):
         """Tokens (B, K, V, features) -> logits (B, classes)."""
         return classifier(self(tokens))
 
-    def each_station(self, tokens: torch.Tensor) -> torch.Tensor:
-        """Tokens (B, K, V, features) -> (B * K, 1, V, features), station by station."""
-        return tokens.flatten(0, 1).unsqueeze(1)
-
     def both(
         self, tokens: torch.Tensor, classifier: nn.Module
     ) -> tuple[torch.Tensor, torch.Tensor]:
         """Tokens (B, K, V, features) -> logits (B, classes), and (B * K, classes) per station."""
         of_all = self.decided(tokens, classifier)
-        of_each = self.decided(self.each_station(tokens), classifier)
+        # B * K samples of one station each.
+        alone = tokens.flatten(0, 1).unsqueeze(1)
+        of_each = self.decided(alone, classifier)
         return of_all, of_each
 
 

@@ -15,7 +15,7 @@ from lowalt.files.atomic import write_file
 from lowalt.files.csv_tables import read_csv
 from lowalt.recognition.model_file import EIGHT, ModelFile, run_folder
 from lowalt.recognition.schemes import SPECTRA
-from lowalt.shards.hub import TAGS
+from lowalt.shards.hub import TAGS, markdown_table
 
 RUN = {
     "train_samples": "training samples",
@@ -77,14 +77,6 @@ def accuracy_rows(model: str | Path, protocol: str, scheme: str) -> list[dict[st
     return [row for row in rows if (row["protocol"], row["scheme"]) == (protocol, scheme)]
 
 
-def _table(header: tuple[str, ...], rows: list[tuple]) -> str:
-    """A Markdown table."""
-    text = ""
-    for line in (header, ("---",) * len(header), *rows):
-        text += "| " + " | ".join(map(str, line)) + " |\n"
-    return text
-
-
 def _shown(value: object) -> str:
     """A value of a record as text of a card."""
     if isinstance(value, float):
@@ -108,7 +100,7 @@ def _accuracy(rows: list[dict[str, str]]) -> str:
         f"From the run's accuracy.csv: accuracy {whose}, with weights as trained, on the test fold "
         "of the protocol, evaluated as the run's\nconfiguration says (there, answers may be means "
         "over a sample and its mirror image; `lowalt predict` takes no such mean).\n\n"
-        + _table(("SNR (dB)", "accuracy (%)", "test samples"), cells)
+        + markdown_table(("SNR (dB)", "accuracy (%)", "test samples"), cells)
     )
 
 
@@ -123,7 +115,7 @@ def _rounded(measured: dict) -> str:
         "Matrices are whole numbers of 8 bits with one scale per row; everything else is float32. "
         f"Both sets of weights answered\nall {measured['samples']} samples of the validation "
         "fold, in float32:\n\n"
-        + _table(("weights", "accuracy (%)"), accuracies)
+        + markdown_table(("weights", "accuracy (%)"), accuracies)
         + f"\n{measured['changed']} answers differ; the largest change of a probability is "
         f"{measured['largest_change']:.4f}.\n"
     )
@@ -194,7 +186,7 @@ def card(content: ModelFile, accuracy: list[dict[str, str]], name: str) -> str:
             f" {MEANING.get(state['protocol'], 'of the user')}.\n"
         ),
         "## Training\n",
-        _table(("entry", "value"), _facts(content)),
+        markdown_table(("entry", "value"), _facts(content)),
         "## Accuracy\n",
         measured,
     ]

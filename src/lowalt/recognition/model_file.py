@@ -27,6 +27,7 @@ import torch
 from safetensors import SafetensorError, safe_open
 from safetensors.torch import save
 
+from lowalt.config.blocks import render_blocks
 from lowalt.config.schema import check_brought
 from lowalt.files.atomic import existing, write_file
 from lowalt.files.errors import InputError, in_one_line
@@ -38,8 +39,6 @@ SCALE = ".scale"
 """Added to the name of a matrix: the name of its scales, (rows,) float32."""
 LARGEST = 127
 """Largest whole number of an 8-bit weight."""
-INPUT = ("network", "spectra", "images")
-"""Blocks of a configuration that say how a model's images are made of signals."""
 EXACT = "as trained"
 EIGHT = "8 bits"
 
@@ -86,7 +85,7 @@ def of_run(path: str | Path) -> ModelFile:
     if folder and (folder / "config.yaml").is_file():
         config = load_yaml(folder / "config.yaml")
         if config:
-            blocks = {name: config[name] for name in INPUT}
+            blocks = render_blocks(config)
     return replace(content, run=run, input=blocks)
 
 

@@ -184,7 +184,7 @@ class Trained:
 
 
 def load(path: str | Path, trusted: str = "", build: Build = built) -> Trained:
-    """Return the trained model of a model file; trusted, build: as in `of_state`.
+    """Return the trained model of a model file; trusted, build: as in `of_file`.
 
     Raises: InputError where the file is missing, damaged or not a model of this project.
     """
@@ -211,29 +211,18 @@ def of_file(
 ) -> Trained:
     """Return the model of a file's content, ready to answer.
 
-    path: where it came from; the rest as in `of_state`.
-    Raises: InputError where weights and settings do not fit together.
-    """
-    return of_state(
-        {**content.model, "weights": model_file.weights_of(content, path)}, path, trusted, build
-    )
-
-
-def of_state(state: dict, path: str | Path, trusted: str = "", build: Build = built) -> Trained:
-    """Return the trained model that a model file keeps.
-
-    state: `weights` and the checked settings of its network;
     path: its file; trusted: the user's FILE.py:FUNCTION for a model whose backbone is such code;
     build: makes its network.
     Raises: InputError where weights and settings do not fit together, or the backbone is code that
     nobody named.
     """
+    weights = model_file.weights_of(content, path)
+    state = content.model
     scheme = of_record(state["scheme"])
     classes = stated(state)
-    weights = state["weights"]
     try:
         refuse_unfinite(weights, path)
-        model = _network(scheme, state, len(classes), path, trusted, build)
+        model = _network(scheme, state, weights, path, trusted, build)
     except InputError as error:
         message = str(error)
         if str(path) not in message:
@@ -248,9 +237,9 @@ def of_state(state: dict, path: str | Path, trusted: str = "", build: Build = bu
 
 
 def _network(
-    scheme: Scheme, state: dict, classes: int, path: str | Path, trusted: str, build: Build
+    scheme: Scheme, state: dict, weights: dict, path: str | Path, trusted: str, build: Build
 ) -> nn.Module:
-    """The network of a file with its weights; trusted, build: as in `of_state`."""
+    """The network of a file with its weights; trusted, build: as in `of_file`."""
     named_backbone = scheme.backbone_of(state["network"])
     name = allowed(named_backbone, trusted)
     block = {**state["network"], "backbone": name, "weights": "none"}
@@ -260,19 +249,19 @@ def _network(
 
     def fresh() -> nn.Module:
         """The network with fresh weights."""
-        return build(bare, block, size, state["colour_map"], classes)
+        return build(bare, block, size, state["colour_map"], len(stated(state)))
 
     if name == named_backbone and build is built:
         return filled(
             fresh,
             lambda: torch.zeros(1, views, size, size, dtype=torch.uint8),
-            state["weights"],
+            weights,
             path,
         )
     # The user named this code, so it is trusted; its output cannot be checked here.
     model = fresh()
-    refuse_unfit(state["weights"], model, path)
-    model.load_state_dict(state["weights"])
+    refuse_unfit(weights, model, path)
+    model.load_state_dict(weights)
     return model
 
 

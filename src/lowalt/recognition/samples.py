@@ -5,8 +5,9 @@ data set that simulates samples on access (`dataset_samples.DatasetSamples`).
 `sample_sources.Source` chooses one. No torch here.
 
 A cache file (.npz) holds, for the samples of one shard in its order,
-    views   (samples, stations spectra, size, size) uint8, station-major, index images averaged over
-    areas spectra names of the spectra, in the order of the tiles
+    views    (samples, stations spectra, size, size) uint8, station-major, index images averaged
+             over areas
+    spectra  names of the spectra, in the order of the tiles
     one array (samples,) for every name of FACTS
 """
 

@@ -83,9 +83,8 @@ def threshold(scores: np.ndarray, labels: np.ndarray, detection: float) -> float
     scores (samples,), labels (samples,); a sample is detected where its score is at least the
     threshold. Set it on validation samples, never on the samples that it is then tested on.
     """
-    wanted = np.sort(scores[labels == LOOKED_FOR])[::-1]
-    needed = int(np.ceil(detection * len(wanted) - 1e-9))
-    return float(wanted[max(needed, 1) - 1])
+    wanted = scores[labels == LOOKED_FOR]
+    return _weighted_threshold(wanted, np.ones(len(wanted)), detection)
 
 
 def measurable(labels: np.ndarray, detection: float) -> bool:
@@ -103,7 +102,9 @@ def _weighted_threshold(scores: np.ndarray, weights: np.ndarray, detection: floa
     """Return `threshold` of scores (n,), where the i-th score counts weights[i] times."""
     order = np.argsort(-scores, kind="stable")
     reached = np.cumsum(weights[order])
-    return float(scores[order][np.searchsorted(reached, detection * reached[-1] - 1e-9)])
+    # The subtrahend keeps the rounding of a product that is whole from asking for one more score.
+    needed = detection * reached[-1] - 1e-9
+    return float(scores[order][np.searchsorted(reached, needed)])
 
 
 def alarm_intervals(

@@ -9,13 +9,13 @@ Paths are relative to the folder in which the report is made. The workflow write
 run.
 """
 
-import json
 from pathlib import Path
 from typing import Any
 
-from lowalt.files.atomic import existing, text_of
+from lowalt.files.atomic import existing
 from lowalt.files.csv_tables import read_csv
 from lowalt.files.errors import InputError
+from lowalt.files.json_objects import read_object
 
 FILES = (
     "accuracy",
@@ -65,14 +65,9 @@ class Inputs:
     def read(cls, path: str | Path) -> "Inputs":
         """Read a manifest.
 
-        Raises: InputError where it is missing, no JSON, or as the constructor says.
+        Raises: InputError where it is missing or no JSON object, or as the constructor says.
         """
-        text = text_of(path, "manifest")
-        try:
-            files = json.loads(text)
-        except ValueError as error:
-            raise InputError(f"{path}: not JSON ({error})") from error
-        return cls(files, str(path))
+        return cls(read_object(path, "a manifest"), str(path))
 
     def __contains__(self, name: str) -> bool:
         """Whether the run or the kept references have this file."""

@@ -1,8 +1,8 @@
 """The samples in the viewer of a page.
 
-They come with their tiles and axes, echoes, probabilities, motion and truth. The viewer is one template with its script and its colours (`viewer.html`), which the report of a run
-and the site of documents share; `shown` returns all that the template needs. All is small: motion
-is kept at FRAMES instants of one cycle.
+They come with their tiles and axes, echoes, probabilities, motion and truth. The report of a run
+and the site of documents share one template with its script and its colours (`viewer.html`);
+`shown` returns all that it needs. All is small: motion is kept at FRAMES instants of one cycle.
 """
 
 import base64

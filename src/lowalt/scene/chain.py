@@ -167,7 +167,8 @@ class SceneSample:
     def direct(self) -> np.ndarray:
         """The target's frequency response (N, M) on the direct path.
 
-        Waves are plane and beams do not squint.
+        Waves are plane and beams do not squint, whatever the scene says: set SNRs refer to this
+        echo, so that noise does not follow the scene's physics of arrays.
         """
         return response(self.view, (), self.weight(self.view))
 
@@ -184,9 +185,9 @@ class SceneSample:
         return arriving_power(cells[np.arange(len(cells)), strongest])
 
     def direct_echo(self, view: View) -> np.ndarray:
-        """Return the target's frequency response (N, M) on the direct path.
+        """Return the frequency response (N, M) of a view's target on the direct path.
 
-        Arrays have the scene's physics.
+        Unlike `direct`, it has the squint and the spherical waves that the scene names.
         """
         return response(view, (), self.weight(view), **self._waves)
 
@@ -332,8 +333,10 @@ class SceneSample:
         """
         if self.view.station.transmitter is not None:
             return False
-        changing = [effect for effect in self.scene.effects if not effect.offers("cross_sections")]
-        return all(effect.place == "motion" for effect in changing)
+        return all(
+            effect.place == "motion" or effect.offers("cross_sections")
+            for effect in self.scene.effects
+        )
 
     def received(self) -> Received:
         """Return the sample's signal, the chosen range cells and the reference power."""
@@ -410,7 +413,7 @@ class SceneSample:
 
         It is that of NR's normal prefix, or the length that an effect states.
         """
-        prefix_s = self.only("prefix_s") or partial(waveform.prefix_length_s, None)
+        prefix_s = self.only("prefix_s") or waveform.normal_prefix_s
         return prefix_s(self.scene.network)
 
     @property
@@ -467,7 +470,7 @@ def scene_signals(
     name: str,
     clouds: Mapping[str, Cloud],
     rows: list[dict],
-    occluders: Mapping[str, dict] | None = None,
+    occluders: Mapping[str, dict] | None,
     snrs: list[float] | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return signals (models, N) complex64 at a station, and reference powers (models,) W.

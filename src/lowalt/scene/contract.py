@@ -1,6 +1,7 @@
 """The contract of effects: the functions that an effect may offer.
 
-Each has its place, arguments, result and owners.
+The contract says for each where effects that offer it act, what it takes and returns, and whether
+several effects of one scene may offer it.
 
 An effect is a module `effects/PLACE/NAME.py`, or a file of the user's own that a configuration
 names by its path. It defines SOURCE, where its law comes from; DEFAULTS, every parameter with its

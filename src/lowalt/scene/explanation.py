@@ -1,6 +1,4 @@
-"""What a scene does to the signals of a few samples.
-
-It says whether the target's cell is found, and what each effect changes.
+"""Whether a scene's receiver finds the targets of a few samples, and what each effect changes.
 
 An effect is priced by leaving it out of the scene, or by adding it with its defaults where the
 scene does not name it. `commands.explain` prints it all. It passes in a function that says what a
@@ -170,9 +168,7 @@ def finding(
     clouds: dict[str, Cloud],
     listed: bool = False,
 ) -> Finding:
-    """Return what is found of a sample's target at a station.
-
-    That is whether it is found, how loud it is against all else, and its levels if asked.
+    """Return whether a sample's target is found at a station, and how loud it is against all else.
 
     listed: whether levels are wanted, which take as long as a sample.
     """
@@ -519,11 +515,9 @@ def cost_text(ms: float, spread_ms: float) -> str:
 
 
 def suggested(overlay: dict, changes: Sequence[Change], least: float) -> str:
-    """Return a scene as YAML with those of its effects that change a signal.
+    """Return a scene as YAML with those of its effects that change a signal by more than `least`.
 
-    The change must be more than `least`; each effect has its share.
-
-    overlay: the scene's own blocks.
+    least: a share of the signal's root mean square; overlay: the scene's own blocks.
     """
     others = {key: value for key, value in overlay.items() if key != "effects"}
     lines = []

@@ -1,6 +1,6 @@
-"""How late the symbols of a sample are, drawn again from its name.
+"""How late the symbols of a sample are, for spectra that use the instants of the symbols.
 
-They are for spectra that know the instants.
+The delays are drawn again from the name of the sample.
 """
 
 from collections.abc import Mapping

@@ -31,11 +31,13 @@ class Scene:
     def stream(self, name: str, row: dict, *ends: str) -> np.random.Generator:
         """Return the stream of an effect for the motion model `row`, from its start.
 
-        more: stations whose draws it holds.
+        ends: names of the stations for which it is drawn, none if all stations share it.
         """
         # Each SNR has a stream of its own, so its noise does not depend on the other SNRs.
-        of_name = [effect.snr_db for effect in self.effects if effect.name == name]
-        levels = [snr_db for snr_db in of_name if snr_db is not None]
+        levels = []
+        for effect in self.effects:
+            if effect.name == name and effect.snr_db is not None:
+                levels.append(effect.snr_db)
         return look_stream(self.seed, name, row, *ends, *levels)
 
     def drawn(self, row: dict, station: Station, name: str) -> np.random.Generator:

@@ -3,7 +3,8 @@
 It is added in all range cells before compression, or later, behind the scene's filters.
 """
 
-from collections.abc import Mapping
+import functools
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -30,6 +31,13 @@ def filters(effects: Mapping[str, dict | None]) -> dict[str, dict]:
     effects: those of a configuration.
     """
     return offering(effects, "detection", "filtered")
+
+
+def filtering(filters: Mapping[str, dict | None]) -> Callable[[np.ndarray], np.ndarray] | None:
+    """Return the function that filters noise (N,) as `behind` does, None without any filter."""
+    if not filters:
+        return None
+    return functools.partial(behind, filters=filters)
 
 
 def behind(noise: np.ndarray, filters: Mapping[str, dict | None]) -> np.ndarray:

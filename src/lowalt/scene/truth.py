@@ -1,6 +1,6 @@
-"""What is true of a target in a look.
+"""What is true of a target in a look: where it is, and where its echo appears.
 
-Where it is (geometric truth) and where its echo appears (observed truth).
+We call the first the geometric truth, the second the observed truth.
 
 The echo of a target at range r turns by 2 f r / c at the effective carrier f, less the phase of the
 arrays' middles, since elements are counted from the one at the station's place. An effect that

@@ -1,7 +1,4 @@
-"""One moving target as one station sees it.
-
-Where its parts and points stand at each instant, and where beams point.
-"""
+"""One moving target as one station sees it: its parts and points at each instant, and the beams."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace

@@ -69,11 +69,9 @@ def range_cells(response: np.ndarray) -> np.ndarray:
     return fft.ifft(response, axis=-1)
 
 
-def prefix_length_s(prefix_s: float | None, network: Network) -> float:
-    """Return the cyclic prefix's length (s): the given one, or NR's normal prefix."""
-    if prefix_s is None:
-        return NORMAL_PREFIX / network.subcarrier_spacing_hz
-    return prefix_s
+def normal_prefix_s(network: Network) -> float:
+    """Return the length (s) of NR's normal cyclic prefix."""
+    return NORMAL_PREFIX / network.subcarrier_spacing_hz
 
 
 def baseband_hz(network: Network) -> np.ndarray:

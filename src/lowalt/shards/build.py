@@ -42,19 +42,18 @@ def write_run(dataset: Dataset, folder: str | Path, kind: str, clouds: bool = Tr
     for chunk in plan.chunks:
         written += write_chunk(dataset, folder, chunk, kind)
         print(f"{chunk}: written", file=sys.stderr)
-    render = {key: dataset.config[key] for key in ("network", "spectra", "images")}
-    return build(
-        written, render, folder / "shards" / "index.json", dataset.maker.echo, dataset.classes
-    )
+    maker = dataset.maker
+    out = folder / "shards" / "index.json"
+    return build(written, maker.render, out, maker.echo, dataset.classes)
 
 
 def rows_of(dataset: Dataset, chunk: str) -> list[dict]:
     """Return the motion table of one chunk."""
     group, _, _ = chunk.partition("-")
-    first, count = dataset.plan.span(chunk)
+    held = dataset.plan.chunk(chunk)
     rows = []
-    for model in range(first, first + count):
-        for subtype in dataset.plan.chunk(chunk).members:
+    for model in range(held.first, held.first + held.count):
+        for subtype in held.members:
             rows.append(dataset.row(Place(group, subtype, model, 0.0)))
     return rows
 
@@ -89,8 +88,8 @@ def write_chunk(dataset: Dataset, folder: Path, chunk: str, kind: str) -> list[P
     effects = maker.echo["effects"]
     if kind == "recipe":
         refuse(effects)
-    if kind == "recipe" and effects:
-        powers = np.concatenate([maker.received(row)[1] for row in rows], axis=1)
+        if effects:
+            powers = np.concatenate([maker.received(row)[1] for row in rows], axis=1)
 
     samples = ChunkSamples(
         rows,

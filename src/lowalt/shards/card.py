@@ -25,7 +25,7 @@ from lowalt.files.csv_tables import write_csv
 from lowalt.files.errors import InputError
 from lowalt.shards import checksums
 from lowalt.shards.croissant import FIELDS, metadata
-from lowalt.shards.hub import front
+from lowalt.shards.hub import front, markdown_table
 from lowalt.shards.read import ShardSet
 from lowalt.shards.sample_list import slug_of
 from lowalt.shards.sample_record import DATA_VERSION
@@ -47,14 +47,6 @@ WHAT = {
     "recipe": "clean complex symbol-domain echoes, to which lowalt adds the noise of each sample",
 }
 """Description of the data, by kind of shards."""
-
-
-def _table(header: tuple[str, ...], rows: list[tuple]) -> str:
-    """Return a Markdown table."""
-    text = ""
-    for line in [header, tuple("---" for _ in header), *rows]:
-        text += "| " + " | ".join(str(cell) for cell in line) + " |\n"
-    return text
 
 
 class Census(NamedTuple):
@@ -104,9 +96,9 @@ def _counts(shards: ShardSet) -> str:
         f"{1e3 * sum(sizes) / max(1, len(shards)):.1f} kB per sample.\n"
     )
     tables = [
-        _table(("subtypes", "fold", "samples"), of_folds),
-        _table(("category", "subtype", "group", "samples"), sorted(of_subtypes)),
-        _table(("SNR (dB)", "samples"), of_snrs),
+        markdown_table(("subtypes", "fold", "samples"), of_folds),
+        markdown_table(("category", "subtype", "group", "samples"), sorted(of_subtypes)),
+        markdown_table(("SNR (dB)", "samples"), of_snrs),
     ]
     return "\n".join([*tables, in_all])
 
@@ -200,7 +192,7 @@ def readme(shards: ShardSet, config: str, name: str, license_name: str) -> str:
         license_address=LICENSES[license_name],
         package=__version__,
         frozen=FROZEN.fullmatch(name),
-        versions=_table(("rules of", "version"), [("lowalt", rules(shards))]),
+        versions=markdown_table(("rules of", "version"), [("lowalt", rules(shards))]),
     )
 
 

@@ -6,7 +6,6 @@ record also has the reference powers of the SNRs and the effects that filter the
 and signals of each sample are computed from these, with the same bytes as in a shard of signals.
 """
 
-import functools
 import io
 import json
 import math
@@ -18,7 +17,7 @@ from lowalt.config.named_code import own_effects
 from lowalt.files.errors import InputError
 from lowalt.noise.awgn import noisy_signals
 from lowalt.scene.effects import PLACES, module_of
-from lowalt.scene.set_noise import behind, in_all_cells
+from lowalt.scene.set_noise import filtering, in_all_cells
 from lowalt.shards.sample_list import sample_key
 from lowalt.shards.sample_record import encoded
 
@@ -116,10 +115,7 @@ def noisy(entry: dict, clean: np.ndarray, stations: list[str], snr_db: float) ->
     powers = None
     if POWER in entry:
         powers = np.array(entry[POWER])[:, None]
-    filtered = None
-    passed = {name: json.loads(entry[name]) for name in FILTERS if name in entry}
-    if passed:
-        filtered = functools.partial(behind, filters=passed)
+    filtered = filtering({name: json.loads(entry[name]) for name in FILTERS if name in entry})
     echoes = clean[:, None]
     signals = noisy_signals(echoes, [entry], stations, [snr_db], entry["seed"], powers, filtered)
     return signals[0, 0]

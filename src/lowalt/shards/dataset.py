@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from lowalt.config.blocks import motion_block
+from lowalt.config.blocks import motion_block, render_blocks
 from lowalt.config.brought import OF_TRAINING, refuse_brought
 from lowalt.config.layers import SCHEMA, check
 from lowalt.config.network import masts_m
@@ -175,7 +175,7 @@ class Dataset:
         self._path = path_of(self._motion, self._corners, self._masts)
         self._track: tuple[str, int] | None = None
         self._track_rows: list[dict] = []
-        render = {key: config[key] for key in ("network", "spectra", "images")}
+        render = render_blocks(config)
         echo = {"tolerance": config["echo"]["tolerance"], "effects": config["effects"]}
         self._recorded = complete(of_record(config["effects"]))
         self.maker = Maker(render, echo, config["seed"], self.clouds, occluders)

@@ -1,9 +1,13 @@
-"""The metadata block at the head of a data card: licence, protocols and shards, as hubs read it."""
+"""The metadata block at the head of a data card: licence, protocols and shards, as hubs read it.
+
+Cards of models share its tags and its tables.
+"""
 
 import json
 from collections.abc import Iterator
 from fnmatch import fnmatchcase
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -16,6 +20,14 @@ from lowalt.shards.sample_table import EXTENSIONS
 from lowalt.shards.stored_cubes import cell_type_of
 
 TAGS = ["radar", "integrated-sensing-and-communication", "micro-doppler", "webdataset", "synthetic"]
+
+
+def markdown_table(header: tuple[str, ...], rows: list[tuple]) -> str:
+    """Return a Markdown table."""
+    text = ""
+    for line in (header, ("---",) * len(header), *rows):
+        text += "| " + " | ".join(map(str, line)) + " |\n"
+    return text
 
 
 def patterns(shards: ShardSet, group: str, fold: str) -> list[str]:
@@ -100,15 +112,12 @@ def features(shards: ShardSet) -> list[dict]:
     for field in record["struct"]:
         if field["name"] == "label":
             field["dtype"] = {"class_label": {"names": classes}}
-    # The type of an array is one nested list per axis.
-    if shards.kind == "image":
-        data: dict = {"dtype": "image"}
-    elif shards.kind != "cube":
-        data = {"list": {"list": {"list": "float32"}}}
-    elif cell_type_of(first) == "int16":
-        data = {"list": {"list": {"list": {"list": "int16"}}}}
-    else:
-        data = {"list": {"list": {"list": {"list": "float32"}}}}
+    data: Any = {"dtype": "image"}
+    if shards.kind != "image":
+        data = "int16" if cell_type_of(first) == "int16" else "float32"
+        # The type of an array is one nested list per axis; a cube has an axis of range cells too.
+        for _ in range(4 if shards.kind == "cube" else 3):
+            data = {"list": data}
     return [
         column("__key__", "string"),
         column("__url__", "string"),

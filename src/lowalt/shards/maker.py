@@ -11,9 +11,11 @@ import numpy as np
 from lowalt.config.network import Network, Station
 from lowalt.echo.chunk import clean_signals
 from lowalt.noise.awgn import noisy_signals
-from lowalt.scene.chain import SceneSample
+from lowalt.scene.chain import SceneSample, scene_signals
+from lowalt.scene.effects import called
 from lowalt.scene.lateness import lateness
-from lowalt.scene.set_noise import behind, filters, in_all_cells
+from lowalt.scene.observe import Scene
+from lowalt.scene.set_noise import filtering, filters, in_all_cells
 from lowalt.shards.sample_record import npy
 from lowalt.shards.stored_cubes import of_cubes
 from lowalt.spectra import Spectra
@@ -133,10 +135,6 @@ class Maker:
         tolerance = self.echo["tolerance"]
         if not self.echo["effects"]:
             return clean_signals(self.network, names, self.clouds, [row], tolerance)[:, 0], None
-        from lowalt.scene.chain import scene_signals
-        from lowalt.scene.effects import called
-        from lowalt.scene.observe import Scene
-
         scene = Scene(self.network, self.seed, tolerance, tuple(called(self.echo["effects"])))
         if snr_db is not None:
             scene = scene.at_snr(snr_db)
@@ -165,13 +163,10 @@ class Maker:
         effects = self.echo["effects"]
         if in_all_cells(effects):
             return self.received(row, snr_db, stations)[0]
-        filtered = None
-        passed = filters(effects)
-        if passed:
-            filtered = functools.partial(behind, filters=passed)
         clean, powers = self.received(row, None, stations)
         names = self._names(stations)
         echoes = clean[:, None]
+        filtered = filtering(filters(effects))
         signals = noisy_signals(echoes, [row], names, [snr_db], self.seed, powers, filtered)
         return signals[0, 0]
 

@@ -95,11 +95,6 @@ class Chunk:
     first: int
     count: int
 
-    @property
-    def holds_first_model(self) -> bool:
-        """Whether the chunk holds the first motion model of each of its subtypes."""
-        return self.first == 0
-
 
 @dataclass(frozen=True)
 class Plan:
@@ -184,17 +179,13 @@ class Plan:
                 members = tuple(name for name in names if name in subtypes)
                 if not members:
                     continue
-                for number in range(self._chunks_of_group):
+                # The last chunk of a group may be smaller.
+                for number in range(-(-self.models // self.models_per_chunk)):
                     name = f"{group}-{number:05d}{suffix}"
                     first = number * self.models_per_chunk
                     count = min(self.models_per_chunk, self.models - first)
                     chunks[name] = Chunk(name, name, members, known, first, count)
         return chunks
-
-    @property
-    def _chunks_of_group(self) -> int:
-        """Number of chunks for the motion models of one group; the last one may be smaller."""
-        return -(-self.models // self.models_per_chunk)
 
     @property
     def samples(self) -> int:
@@ -216,11 +207,6 @@ class Plan:
     def chunk(self, name: str) -> Chunk:
         """Return a chunk by its name."""
         return self._chunks[name]
-
-    def span(self, chunk: str) -> tuple[int, int]:
-        """Return first model number and count of models of each subtype in a chunk."""
-        held = self._chunks[chunk]
-        return held.first, held.count
 
     def folds(self, chunk: str) -> list[str]:
         """Return the folds that have a sample in this chunk; each becomes one shard."""

@@ -15,6 +15,7 @@ from typing import NoReturn
 
 import numpy as np
 
+from lowalt.config.blocks import render_blocks
 from lowalt.config.classes import stated
 from lowalt.config.extensions import module_offered, offered
 from lowalt.config.network import station_names
@@ -214,9 +215,7 @@ class ShardSet:
     @functools.cached_property
     def renderer(self) -> Renderer:
         """The renderer that turns the signals of these shards into tiles, as the index says."""
-        return Renderer.from_settings(
-            {key: self.index["render"][key] for key in ("network", "spectra", "images")}
-        )
+        return Renderer.from_settings(render_blocks(self.index["render"]))
 
     @property
     def spectra(self) -> tuple[str, ...]:

@@ -194,5 +194,5 @@ class SampleList:
             "snr_db": np.array([place.snr_db for place in places], float),
             "group": np.array([place.group for place in places]),
             "fold": np.array([self.fold(place) for place in places]),
-            "label": np.array([self.label_of[place.subtype] for place in places], np.int64),
+            "label": self.labels,
         }

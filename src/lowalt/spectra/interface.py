@@ -131,7 +131,3 @@ class OfCells(Protocol):
     def definition(self, cube: Cube, settings: Any) -> np.ndarray:
         """Return the image of a cube in float64, (rows, columns)."""
         ...
-
-    def fill_cells(self, cube: Cube, settings: Any, out: np.ndarray) -> None:
-        """Fill out (rows, columns) float32 with the image of a cube whose values are below 1."""
-        ...

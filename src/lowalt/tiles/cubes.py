@@ -1,8 +1,6 @@
-"""The cubes of samples: the range cells of every symbol with noise.
+"""The cubes of samples: the noisy range cells of every symbol, of which the receiver chooses one.
 
-They are those before the receiver chooses one of them.
-
-The scene's canceller, if any, has already been applied.
+The linear filters of the scene's detection, such as a canceller, have been applied to them.
 """
 
 from collections.abc import Mapping
@@ -45,10 +43,7 @@ def _received_symbols(view: View) -> slice | np.ndarray:
 
 
 class Cubes:
-    """Makes the cubes of samples and keeps the clean ones of the last motion models and stations.
-
-    kept: how many of them.
-    """
+    """Makes the cubes of samples and keeps the clean ones of the last motion models and stations."""
 
     def __init__(
         self,
@@ -59,13 +54,12 @@ class Cubes:
         empty: bool = False,
         kept: int = 3,
     ) -> None:
-        """Take the scene, clouds by subtype and each subtype's surfaces.
+        """Take the scene and clouds by subtype.
 
-        They are needed where the scene hides points behind them.
-
+        occluders: each subtype's surfaces, needed where the scene hides points behind them;
         every_cell: whether noise at the samples' SNRs is an effect of the scene
         (`set_noise.in_all_cells`); empty: whether the targets reflect nothing, so that noise and
-        land alone are left.
+        land alone are left; kept: how many clean samples stay in memory.
         """
         self.scene = scene
         self.clouds = clouds

@@ -13,7 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.files.atomic import existing, replacing
+from lowalt.files.array_files import array_of
+from lowalt.files.atomic import replacing
 from lowalt.files.errors import InputError
 from lowalt.tiles.render import split
 from lowalt.tiles.resample import resize
@@ -67,10 +68,7 @@ def read(path: str | Path, size: int, samples: int) -> np.ndarray:
     Raises: InputError naming the file where it is missing, damaged, or of other samples or another
     size.
     """
-    try:
-        images = np.lib.format.open_memmap(existing(path, "reduced images"), "r")
-    except (OSError, ValueError, EOFError) as error:
-        raise InputError(f"{path}: not reduced images ({error})") from error
+    images = array_of(path, "reduced images", mapped=True)
     if (
         images.dtype != np.uint8
         or images.ndim != 4

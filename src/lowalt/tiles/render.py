@@ -53,10 +53,9 @@ class Renderer:
 
     Three stations' tones:
 
+        >>> from lowalt.config.blocks import render_blocks
         >>> from lowalt.config.layers import overlaid
-        >>> config = overlaid([])
-        >>> parts = ("network", "spectra", "images")
-        >>> renderer = Renderer.from_settings({key: config[key] for key in parts})
+        >>> renderer = Renderer.from_settings(render_blocks(overlaid([])))
         >>> signals = np.exp(0.8j * np.arange(1200).reshape(3, 400))
         >>> tile = renderer.tile(signals.astype(np.complex64))
         >>> tile.shape, split(tile, spectra=3).shape
@@ -176,7 +175,7 @@ class Renderer:
         setting = self.spectra[name]
         kind = spectrum(name)
         if isinstance(signal, Cube):
-            kind.fill_cells(signal, setting, plan.values)
+            plan.values[:] = kind.definition(signal, setting)
         elif self.spectra.times == "even" or even(signal, late):
             re = np.ascontiguousarray(signal.real)
             im = np.ascontiguousarray(signal.imag)

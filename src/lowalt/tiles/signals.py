@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from lowalt.config.network import Network
-from lowalt.files.atomic import existing
+from lowalt.files.array_files import array_of
 from lowalt.files.errors import InputError
 
 
@@ -14,10 +14,7 @@ def load_signals(path: str | Path, network: Network) -> np.ndarray:
 
     Raises: InputError naming the file and what does not fit.
     """
-    try:
-        signals = np.load(existing(path, "noisy signals"), mmap_mode="r")
-    except (ValueError, EOFError) as error:
-        raise InputError(f"{path}: not a NumPy array ({error})") from error
+    signals = array_of(path, "noisy signals", mapped=True)
     shape = (len(network.stations), network.symbols)
     if signals.dtype != np.complex64 or signals.ndim != 4 or signals.shape[2:] != shape:
         raise InputError(

@@ -97,7 +97,7 @@ def _refuse_ranges(key: str, ranges: dict, names: Collection[str], expected: str
             )
 
 
-def refuse_sizes(config: dict, classes: tuple[str, ...] = tuple(CATEGORIES)) -> None:
+def refuse_sizes(config: dict, classes: tuple[str, ...]) -> None:
     """Refuse sizes of unknown classes, reversed ranges, and sizes together with effects."""
     sizes = config["motion"].get("sizes_m", {})
     _refuse_ranges("motion.sizes_m", sizes, classes, f"some of the classes {list(classes)}")

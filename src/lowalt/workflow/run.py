@@ -12,6 +12,7 @@ from typing import Any
 
 from lowalt.config.classes import classes_of
 from lowalt.config.layers import check
+from lowalt.config.named_code import file_of
 from lowalt.config.network import Network, station_names
 from lowalt.files.atomic import slug
 from lowalt.files.errors import InputError
@@ -119,9 +120,7 @@ class Run:
     def own_backbone(self, scheme: Scheme) -> str:
         """Return FILE.py:FUNCTION of a scheme's backbone, "" for a library's."""
         name = scheme.backbone_of(self.config["recognition"]["network"])
-        if ".py:" not in name:
-            return ""
-        return name
+        return name if file_of(name) else ""
 
     @cached_property
     def trained(self) -> list[Scheme]:

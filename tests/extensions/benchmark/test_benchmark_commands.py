@@ -177,6 +177,7 @@ def test_make_says_what_it_costs_and_makes_the_images_that_the_tracks_use(
         workflow, "ended", lambda options: asked.append(options.target) or {"status": 0}
     )
     monkeypatch.setattr(frozen_bytes, "compared", lambda part, folder: [])
+    job = {"rule_name": "views", "s": 1, "cpu_time": 1, "max_rss": 1}
     for part in ("main", "low-snr"):
         times = Path("results", definition.run_name(part), "benchmarks")
         for name, cpu_s in (
@@ -185,9 +186,9 @@ def test_make_says_what_it_costs_and_makes_the_images_that_the_tracks_use(
             ("echo/a", "NA"),
         ):
             (times / name).parent.mkdir(parents=True, exist_ok=True)
-            (times / f"{name}.jsonl").write_text(json.dumps({"cpu_time": cpu_s}) + "\n")
+            (times / f"{name}.jsonl").write_text(json.dumps(job | {"cpu_time": cpu_s}) + "\n")
         for pair in ("seen-train", "seen-val", "seen-test", "unseen-val", "unseen-test"):
-            (times / f"views/24/{pair}-00000.jsonl").write_text('{"cpu_time": 1}\n')
+            (times / f"views/24/{pair}-00000.jsonl").write_text(json.dumps(job) + "\n")
     monkeypatch.setattr(costs, "REFERENCE", str(tmp_path))
     costs.write("results", tmp_path)
     assert main(["benchmark", "make", "--track", "unseen", "--json"]) == 0

@@ -4,17 +4,16 @@
 and fold.
 """
 
-import json
 from pathlib import Path
 from typing import NamedTuple
 
 from lowalt.extensions.benchmark.benchmark_tracks import Track
 from lowalt.extensions.benchmark.definition import MAIN, PARTS, REFERENCE, run_name
-from lowalt.files.atomic import text_of
 from lowalt.files.csv_tables import number, read_csv, write_csv
 from lowalt.files.errors import InputError
 from lowalt.files.shipped import shipped
 from lowalt.machine.hardware import describe
+from lowalt.machine.job_times import job_times
 
 NAME = "costs.csv"
 COLUMNS = ("part", "files", "core_s", "megabytes", "hardware")
@@ -88,14 +87,8 @@ def measured(part: str, folder: str | Path) -> list[tuple]:
             f"{run}/benchmarks: no times of jobs, expected those of `lowalt benchmark make`"
         )
     for path in times:
-        # A line for each time that the job ran: the last run made the files that are there.
-        last_run = json.loads(text_of(path, "times of a job").splitlines()[-1])
-        job_core_s = last_run["cpu_time"]
-        if not isinstance(job_core_s, (int, float)):
-            # Snakemake has no time of jobs that end before it first samples them.
-            job_core_s = 0.0
         files = _files_of(path.relative_to(run / "benchmarks"))
-        core_s[files] = core_s.get(files, 0.0) + job_core_s
+        core_s[files] = core_s.get(files, 0.0) + job_times(path).processor_s
     for path in sorted(run.rglob("*")):
         if path.is_file():
             files = _files_of(path.relative_to(run))

@@ -58,8 +58,3 @@ def definition(cube: Cube, settings: Settings) -> np.ndarray:
     count = columns(settings, len(cells))
     summed = sum(power[step : step + count] for step in range(settings.window))
     return np.sqrt(summed / settings.window).T
-
-
-def fill_cells(cube: Cube, settings: Settings, out: np.ndarray) -> None:
-    """Fill out (ranges, symbols) float32 with the profiles of a cube."""
-    out[:] = definition(cube, settings)

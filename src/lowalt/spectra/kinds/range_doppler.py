@@ -78,8 +78,3 @@ def definition(cube: Cube, settings: Settings) -> np.ndarray:
     # A receding echo has a negative frequency, so the most negative frequency is the largest speed.
     turned = spectrum[::-1].T
     return np.sqrt(turned.real**2 + turned.imag**2)
-
-
-def fill_cells(cube: Cube, settings: Settings, out: np.ndarray) -> None:
-    """Fill out (ranges, speeds) float32 with the map of a cube."""
-    out[:] = definition(cube, settings)

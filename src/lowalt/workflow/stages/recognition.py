@@ -22,7 +22,7 @@ class RecognitionStage(RunStage):
     def first_chunks(self) -> list[str]:
         """The chunks whose motion tables together hold at least one model of every subtype."""
         plan = self._run.plan
-        return [name for name in plan.sources if plan.chunk(name).holds_first_model]
+        return [name for name in plan.sources if plan.chunk(name).first == 0]
 
     def is_made_by_tiles_stage(self, wildcards: Any) -> bool:
         """Return whether the tiles stage makes images of a job's size, one file a chunk."""

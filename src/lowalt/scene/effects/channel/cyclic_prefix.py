@@ -20,7 +20,7 @@ from scipy import fft
 
 from lowalt.config.network import SPEED_OF_LIGHT, Network
 from lowalt.scene.view import View
-from lowalt.scene.waveform import prefix_length_s
+from lowalt.scene.waveform import normal_prefix_s
 
 SOURCE = (
     "3GPP TS 38.211, 5.3.1 (normal cyclic prefix, 144 of 2048 samples); interference beyond it: D. "
@@ -41,7 +41,9 @@ def lost(delay_s: np.ndarray | float, prefix_s: float, network: Network) -> np.n
 
 def prefix_s(settings: dict, network: Network) -> float:
     """Return the prefix's length (s)."""
-    return prefix_length_s(settings["prefix_s"], network)
+    if settings["prefix_s"] is None:
+        return normal_prefix_s(network)
+    return settings["prefix_s"]
 
 
 def levels(settings: dict, view: View) -> list[tuple[str, float, str]]:
