@@ -62,9 +62,13 @@ def test_two_commands_lead_from_a_file_to_an_answer(tmp_path, capsys, monkeypatc
     assert "windows hold a target" in capsys.readouterr().out
     # A record that somebody wrote is not written over; a draft is, by another reading.
     assert lowalt([*line, "--take", "2"]) == 0
-    (tmp_path / "a.yaml").write_text("file: mine\n")
-    assert lowalt(line) == 2
-    assert "a.yaml: is there already and no draft" in capsys.readouterr().err
+    draft = (tmp_path / "a.yaml").read_text()
+    for kept in ("file: mine\n", draft + "empty_s: [0, 3]\n", draft.replace("int16", "uint16")):
+        assert kept != draft
+        (tmp_path / "a.yaml").write_text(kept)
+        assert lowalt(line) == 2
+        assert "a.yaml: is there already and no draft" in capsys.readouterr().err
+        assert (tmp_path / "a.yaml").read_text() == kept
 
 
 def test_without_a_carrier_the_next_command_asks_for_it(tmp_path, capsys, monkeypatch):
