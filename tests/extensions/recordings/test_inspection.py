@@ -86,6 +86,23 @@ def test_without_a_carrier_the_next_command_asks_for_it(tmp_path, capsys, monkey
     }
 
 
+@pytest.mark.parametrize("kind", ["stereo WAV", "csv"])
+def test_the_draft_of_a_rate_that_the_file_contradicts_is_read(kind, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    if kind == "csv":
+        path = tmp_path / "a.csv"
+        values = echo()
+        columns = [np.arange(len(values)) / RATE, values.real, values.imag]
+        np.savetxt(path, np.stack(columns, 1), delimiter=",", header="time_s,I,Q", comments="")
+    else:
+        path = WRITTEN["written"](kind, echo(), tmp_path)
+    line = ["recording", "inspect", path.name, "--carrier", "3.3e9", "--rate", "4000"]
+    assert lowalt(line) == 0
+    said = capsys.readouterr().out
+    assert "note: the file states a rate of 5000 Hz: with `trust: record` the stated 4000" in said
+    assert read(read_record(path.with_suffix(".yaml"))).rate_hz == 4000
+
+
 def test_hum_a_constant_part_and_an_image_are_pointed_out(tmp_path):
     times = np.arange(20000) / RATE
     hum = sum(np.cos(2 * np.pi * 50 * number * times) / number for number in (1, 2, 3))
