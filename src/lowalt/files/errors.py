@@ -153,6 +153,20 @@ def reading(path: str | Path, kind: str) -> Iterator[None]:
         ) from None
 
 
+@contextmanager
+def running(code: str) -> Iterator[None]:
+    """Turn any error of code from elsewhere, also its call of `sys.exit`, into one sentence.
+
+    code: how the sentence names it. Raises: InputError, the code's own if it raised one.
+    """
+    try:
+        yield
+    except InputError:
+        raise
+    except (Exception, SystemExit) as error:
+        raise InputError(f"{code}: {type(error).__name__}: {str(error)[:200]}") from error
+
+
 def in_one_line(error: Exception) -> str:
     """Return what a library's error says, as one line of bounded length."""
     return " ".join(str(error).split())[:LONGEST_VALUE]

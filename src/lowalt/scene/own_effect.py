@@ -14,7 +14,7 @@ from pathlib import Path
 from types import ModuleType
 
 from lowalt.config.schema import NUMBER
-from lowalt.files.errors import InputError
+from lowalt.files.errors import InputError, running
 from lowalt.scene.contract import OFFERS
 
 
@@ -35,10 +35,8 @@ def _run(name: str, source: bytes) -> ModuleType:
     """The module that a source (bytes) makes; it is not written as byte code beside the file."""
     module = ModuleType(f"lowalt_own_effect_{Path(name).stem}")
     module.__file__ = name
-    try:
+    with running(f"effects: {name}"):
         exec(compile(source, name, "exec"), module.__dict__)
-    except Exception as error:
-        raise InputError(f"effects: {name}: {type(error).__name__}: {str(error)[:200]}") from error
     return kept_contract(name, module)
 
 
