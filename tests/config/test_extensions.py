@@ -25,9 +25,11 @@ NUMBER = 3
 
 
 def __getattr__(name: str) -> None:
-    """End the process where an entry point asks for `ENDS`."""
+    """End the process, or fail in two lines, where an entry point asks for it."""
     if name == "ENDS":
         sys.exit(7)
+    if name == "LINES":
+        raise RuntimeError("two\nlines")
     raise AttributeError(f"module has no attribute {name!r}")
 
 
@@ -57,6 +59,7 @@ def installed(monkeypatch):
         ("MISSING", "has no attribute"),
         ("NUMBER", "expected an Extension"),
         ("ENDS", "SystemExit: 7"),
+        ("LINES", "RuntimeError: two lines"),
         ("NO_COMMAND", "expected a Command"),
         ("TAKEN", "lowalt's own"),
         ("FACE", "functions 'receive' is lowalt's own"),

@@ -164,10 +164,10 @@ def running(code: str) -> Iterator[None]:
     except InputError:
         raise
     except (Exception, SystemExit) as error:
-        raise InputError(f"{code}: {type(error).__name__}: {str(error)[:200]}") from error
+        raise InputError(f"{code}: {type(error).__name__}: {in_one_line(error)}") from error
 
 
-def in_one_line(error: Exception) -> str:
+def in_one_line(error: BaseException) -> str:
     """Return what a library's error says, as one line of bounded length."""
     return " ".join(str(error).split())[:LONGEST_VALUE]
 
