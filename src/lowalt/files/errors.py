@@ -4,6 +4,7 @@ import difflib
 import re
 import shlex
 import sys
+import traceback
 import warnings
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -154,16 +155,21 @@ def reading(path: str | Path, kind: str) -> Iterator[None]:
 
 
 @contextmanager
-def running(code: str) -> Iterator[None]:
+def running(code: str, file: str = "") -> Iterator[None]:
     """Turn any error of code from elsewhere, also its call of `sys.exit`, into one sentence.
 
-    code: how the sentence names it. Raises: InputError, the code's own if it raised one.
+    code: how the sentence names it; file: its path, whose line the sentence names too. Raises:
+    InputError, the code's own if it raised one.
     """
     try:
         yield
     except InputError:
         raise
     except (Exception, SystemExit) as error:
+        steps = traceback.extract_tb(error.__traceback__)
+        lines = [step.lineno for step in steps if step.filename == file]
+        if lines:
+            code += f", line {lines[-1]}"
         raise InputError(f"{code}: {type(error).__name__}: {in_one_line(error)}") from error
 
 

@@ -39,7 +39,7 @@ def backbone(name: str, size: int) -> nn.Module:
         raise InputError(f"network: backbone {name!r}: {path} is no Python file")
     module = importlib.util.module_from_spec(specification)
     sys.modules[specification.name] = module
-    with running(f"network: backbone {name!r}"):
+    with running(f"network: backbone {name!r}", str(path)):
         specification.loader.exec_module(module)
         if not callable(getattr(module, function, None)):
             raise InputError(f"network: backbone {name!r}: {path} has no function {function!r}")
