@@ -4,10 +4,10 @@ recordings of cars.
     python studies/measured/fourth_radar.py --inputs FOLDER --out results/measured
 
 `lowalt recording train` simulates an HB100 module (10.525 GHz, one real channel) by the record of
-one recording (`fourth_radar.yaml`), of which it takes the noise floor alone, and trains. The table
-measured-fourth.csv has the labelled windows of each recording by what `lowalt predict` says of them
-with this network, and with `KNOWN`, which learned another radar near that carrier. The recordings
-were used for no decision.
+one recording (`fourth_radar.yaml`), of which it takes the noise floor alone, and trains one network
+for each training seed. The table measured-fourth.csv has the labelled windows of each recording by
+what `lowalt predict` says of them with each network (`hb100-SEED`), and with `KNOWN`, which learned
+another radar near that carrier. The recordings were used for no decision.
 """
 
 import argparse
@@ -79,7 +79,7 @@ def rows(model: str, inputs: Path) -> list[list]:
 
 
 def main(arguments: list[str]) -> None:
-    """Train the recogniser, name the recordings and write the table."""
+    """Train the recognisers, name the recordings and write the table."""
     line = argparse.ArgumentParser(prog="fourth_radar.py", description=main.__doc__)
     line.add_argument("--inputs", required=True, type=Path, help="folder of the recordings")
     line.add_argument("--out", required=True, type=Path, help="folder to write")
@@ -89,9 +89,16 @@ def main(arguments: list[str]) -> None:
     options = line.parse_args(arguments)
     first = load_yaml(RECORDS, "records")["records"][0]
     about = record(first, options.inputs, first["file"])
-    expected = trained_radar(about, options.out / "hb100", settings(options.recognition))
-    print(f"expected: {expected['percent']:.1f} % of {expected['windows']} simulated windows right")
-    found = [row for model in (str(expected["file"]), KNOWN) for row in rows(model, options.inputs)]
+    block = settings(options.recognition)
+    models = []
+    for seed in block["seeds"]:
+        expected = trained_radar(about, options.out / f"hb100-{seed}", {**block, "seeds": [seed]})
+        print(
+            f"seed {seed}: {expected['percent']:.1f} % of {expected['windows']} simulated windows"
+            " are right"
+        )
+        models.append(str(expected["file"]))
+    found = [row for model in (*models, KNOWN) for row in rows(model, options.inputs)]
     write_csv(options.out / "measured-fourth.csv", COLUMNS, found)
     for row in found:
         print(
