@@ -10,7 +10,9 @@ import sys
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
+from scipy.io import savemat
 
 from lowalt.config.command import error_sentence
 from lowalt.files.errors import SpaceError
@@ -43,6 +45,21 @@ def test_a_full_output_is_said_in_one_sentence(words):
         )
     expected = "error: standard output: No space left on device, expected room to write\n"
     assert (ended.returncode, ended.stderr) == (2, expected)
+
+
+def test_a_full_folder_of_temporary_files_is_named_and_not_the_recording(tmp_path):
+    savemat(tmp_path / "a.mat", {"samples": np.ones((5000, 2))}, do_compression=True)
+    largest = 2 * (tmp_path / "a.mat").stat().st_size
+    ended = subprocess.run(
+        [sys.executable, "-m", "lowalt", "recording", "inspect", str(tmp_path / "a.mat")],
+        capture_output=True,
+        text=True,
+        cwd=ROOT,
+        env={**os.environ, "TMPDIR": str(tmp_path)},
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (largest, largest)),
+    )
+    assert ended.returncode == 2
+    assert f"no room for its arrays in {tmp_path}, expected another TMPDIR" in ended.stderr
 
 
 def test_a_command_with_too_little_memory_is_refused_before_it_would_hang(tmp_path):

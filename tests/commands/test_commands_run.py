@@ -71,6 +71,13 @@ def test_a_run_is_refused_before_snakemake_starts(changes, words):
         workflow.command(given(**changes))
 
 
+def test_a_run_whose_cache_cannot_be_made_is_refused_by_its_folder(tmp_path, monkeypatch):
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file/cache"))
+    with pytest.raises(InputError, match=r"file/cache/snakemake.*: .*, expected XDG_CACHE_HOME: a"):
+        workflow.command(given())
+
+
 def test_a_sample_to_explain_is_a_subtype_and_a_number():
     assert explain._sample("Crow:3") == ("Crow", 3) and explain._sample("a:b:12") == ("a:b", 12)
     for wrong in ("Crow", ":3", "Crow:", "Crow:-1", "Crow:1.5"):

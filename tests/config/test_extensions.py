@@ -24,6 +24,15 @@ AGAIN = Extension(effects={"mist": AddedEffect("other", "channel")}, commands=GO
 NUMBER = 3
 
 
+def __getattr__(name: str) -> None:
+    """End the process, or fail in two lines, where an entry point asks for it."""
+    if name == "ENDS":
+        sys.exit(7)
+    if name == "LINES":
+        raise RuntimeError("two\nlines")
+    raise AttributeError(f"module has no attribute {name!r}")
+
+
 @pytest.fixture
 def installed(monkeypatch):
     """A function that makes these names of this module the only extensions, and returns what is
@@ -49,6 +58,8 @@ def installed(monkeypatch):
     [
         ("MISSING", "has no attribute"),
         ("NUMBER", "expected an Extension"),
+        ("ENDS", "SystemExit: 7"),
+        ("LINES", "RuntimeError: two lines"),
         ("NO_COMMAND", "expected a Command"),
         ("TAKEN", "lowalt's own"),
         ("FACE", "functions 'receive' is lowalt's own"),

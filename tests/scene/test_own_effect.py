@@ -92,6 +92,19 @@ def test_a_factor_of_another_shape_than_the_contract_s_is_refused_in_one_sentenc
         sample_of({"half.py": {}}).arrived()
 
 
+@pytest.mark.parametrize(
+    ("step", "said"),
+    [("{}['gone']", "KeyError: 'gone'"), ("exit(3)", "SystemExit: 3")],
+)
+def test_an_error_of_its_function_is_one_sentence_with_the_line(half, step, said):
+    Path("half.py").write_text(
+        HALF.replace("    return settings", f"    {step}\n    return settings")
+    )
+    line = HALF.split("\n").index("def visible(settings, view, rng):") + 2
+    with pytest.raises(InputError, match=rf"effects: half\.py, line {line}: {said}"):
+        sample_of({"half.py": {}}).arrived()
+
+
 ACTING = {
     "visible": "view, rng",
     "visible_one_way": "view, rng",

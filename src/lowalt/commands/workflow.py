@@ -76,6 +76,23 @@ def _refuse(options: argparse.Namespace) -> None:
             f"--profile {options.profile}: no config.yaml there, expected a folder such as "
             "profiles/slurm"
         )
+    _refuse_a_cache_that_cannot_be_made()
+
+
+def _refuse_a_cache_that_cannot_be_made() -> None:
+    """Make the folder of Snakemake's cache, whose failure Snakemake would show as a traceback."""
+    try:
+        from platformdirs import user_cache_path
+    except ImportError:
+        # Snakemake, which brings this package, is missing, and its start says so.
+        return
+    cache = user_cache_path("snakemake", "snakemake") / "snakemake/source-cache"
+    try:
+        cache.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(
+            f"{cache}: {error.strerror}, expected XDG_CACHE_HOME: a folder that this user may write"
+        ) from error
 
 
 def command(options: argparse.Namespace) -> list[str]:

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 
 import lowalt
 from lowalt.config.core_commands import CORE_COMMANDS, Command
-from lowalt.files.errors import InputError, shown
+from lowalt.files.errors import InputError, running, shown
 from lowalt.files.package_plan import PACKAGE
 
 GROUP = "lowalt.extensions"
@@ -101,10 +101,8 @@ def _loaded(point: EntryPoint) -> Extension:
 
     Raises: InputError naming it where it cannot be imported or is none.
     """
-    try:
+    with running(_label(point)):
         extension = point.load()
-    except Exception as error:
-        raise InputError(f"{_label(point)}: {type(error).__name__}: {str(error)[:200]}") from error
     if not isinstance(extension, Extension):
         raise InputError(
             f"{_label(point)}: {point.value} is {shown(extension)}, expected an Extension"
@@ -205,13 +203,8 @@ def module_offered(kind: str, name: str, module: str) -> ModuleType:
     Raises: InputError naming the extension where the import ends in an error other than a missing
     package.
     """
-    try:
+    with running(f"extension {owner(kind, name)!r}: {kind} {name!r}"):
         return importlib.import_module(module)
-    except InputError:
-        raise
-    except Exception as error:
-        where = f"extension {owner(kind, name)!r}: {kind} {name!r}"
-        raise InputError(f"{where}: {type(error).__name__}: {str(error)[:200]}") from error
 
 
 def function_offered(kind: str, name: str, module: str, function: str) -> Callable[..., Any]:

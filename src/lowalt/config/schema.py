@@ -2,7 +2,7 @@
 
 Numbers are finite and integers are written as such (no 8.0) and fit 64 bits; `const: inf` also
 accepts an infinity; text that a pattern describes has no control characters, so that it can be
-printed.
+printed. `ascending: true` accepts only a list whose numbers do not fall.
 """
 
 import functools
@@ -56,6 +56,16 @@ def _const(
         )
 
 
+def _ascending(
+    validator: Any, wanted: bool, value: object, schema: dict
+) -> Iterator[jsonschema.ValidationError]:
+    """Refuse a list of numbers in which one is smaller than the number before it."""
+    if not isinstance(value, (list, tuple)) or not all(_number(None, item) for item in value):
+        return
+    if wanted and list(value) != sorted(value):
+        yield jsonschema.ValidationError("not ascending")
+
+
 def _array(checker: Any, value: object) -> bool:
     """Whether a value is a list, or a tuple in its place."""
     return isinstance(value, (list, tuple))
@@ -63,7 +73,7 @@ def _array(checker: Any, value: object) -> bool:
 
 Validator = jsonschema.validators.extend(
     jsonschema.Draft202012Validator,
-    {"pattern": _pattern, "const": _const},
+    {"pattern": _pattern, "const": _const, "ascending": _ascending},
     type_checker=jsonschema.Draft202012Validator.TYPE_CHECKER.redefine_many(
         {"integer": _whole, "number": _number, "array": _array}
     ),
@@ -148,6 +158,7 @@ def _expected(error: Any) -> str:
         "minProperties": f"at least {wanted} key(s)",
         "maxProperties": f"at most {wanted} key(s)",
         "uniqueItems": "every item once",
+        "ascending": "the least number first",
         "pattern": f"text like {wanted}",
     }
     if rule in words:

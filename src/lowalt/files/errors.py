@@ -4,6 +4,7 @@ import difflib
 import re
 import shlex
 import sys
+import traceback
 import warnings
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -153,7 +154,26 @@ def reading(path: str | Path, kind: str) -> Iterator[None]:
         ) from None
 
 
-def in_one_line(error: Exception) -> str:
+@contextmanager
+def running(code: str, file: str = "") -> Iterator[None]:
+    """Turn any error of code from elsewhere, also its call of `sys.exit`, into one sentence.
+
+    code: how the sentence names it; file: its path, whose line the sentence names too. Raises:
+    InputError, the code's own if it raised one.
+    """
+    try:
+        yield
+    except InputError:
+        raise
+    except (Exception, SystemExit) as error:
+        steps = traceback.extract_tb(error.__traceback__)
+        lines = [step.lineno for step in steps if step.filename == file]
+        if lines:
+            code += f", line {lines[-1]}"
+        raise InputError(f"{code}: {type(error).__name__}: {in_one_line(error)}") from error
+
+
+def in_one_line(error: BaseException) -> str:
     """Return what a library's error says, as one line of bounded length."""
     return " ".join(str(error).split())[:LONGEST_VALUE]
 

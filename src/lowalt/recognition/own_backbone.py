@@ -13,7 +13,7 @@ import torch
 from torch import nn
 
 from lowalt.config.named_code import file_and_function, file_of
-from lowalt.files.errors import InputError
+from lowalt.files.errors import InputError, running
 
 MIDDLE = {"mean": (0.5, 0.5, 0.5), "std": (0.5, 0.5, 0.5)}
 """How colours in 0..1 are shifted and scaled for a module that has no `pretrained_cfg` of its own.
@@ -39,17 +39,13 @@ def backbone(name: str, size: int) -> nn.Module:
         raise InputError(f"network: backbone {name!r}: {path} is no Python file")
     module = importlib.util.module_from_spec(specification)
     sys.modules[specification.name] = module
-    try:
+    with running(f"network: backbone {name!r}", str(path)):
         specification.loader.exec_module(module)
         if not callable(getattr(module, function, None)):
             raise InputError(f"network: backbone {name!r}: {path} has no function {function!r}")
         network = getattr(module, function)(size)
         with torch.no_grad():
             features = network.eval()(torch.zeros(2, 3, size, size))
-    except InputError:
-        raise
-    except Exception as error:
-        raise InputError(f"network: backbone {name!r}: {type(error).__name__}: {error}") from error
     if not isinstance(features, torch.Tensor) or features.ndim != 2 or len(features) != 2:
         given: object = type(features).__name__
         if isinstance(features, torch.Tensor):

@@ -10,11 +10,13 @@ user, so an overlay alone may name it (`lowalt.config.named_code`).
 import functools
 import inspect
 import math
+from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 from lowalt.config.schema import NUMBER
-from lowalt.files.errors import InputError
+from lowalt.files.errors import InputError, running
 from lowalt.scene.contract import OFFERS
 
 
@@ -35,11 +37,24 @@ def _run(name: str, source: bytes) -> ModuleType:
     """The module that a source (bytes) makes; it is not written as byte code beside the file."""
     module = ModuleType(f"lowalt_own_effect_{Path(name).stem}")
     module.__file__ = name
-    try:
+    with running(f"effects: {name}", name):
         exec(compile(source, name, "exec"), module.__dict__)
-    except Exception as error:
-        raise InputError(f"effects: {name}: {type(error).__name__}: {str(error)[:200]}") from error
-    return kept_contract(name, module)
+    kept_contract(name, module)
+    for function in OFFERS:
+        if callable(getattr(module, function, None)):
+            setattr(module, function, _guarded(name, getattr(module, function)))
+    return module
+
+
+def _guarded(name: str, function: Callable) -> Callable:
+    """A function of a user's own file whose errors are one sentence."""
+
+    @functools.wraps(function)
+    def called(*arguments: Any) -> Any:
+        with running(f"effects: {name}", name):
+            return function(*arguments)
+
+    return called
 
 
 def kept_contract(name: str, module: ModuleType) -> ModuleType:

@@ -62,9 +62,13 @@ def test_two_commands_lead_from_a_file_to_an_answer(tmp_path, capsys, monkeypatc
     assert "windows hold a target" in capsys.readouterr().out
     # A record that somebody wrote is not written over; a draft is, by another reading.
     assert lowalt([*line, "--take", "2"]) == 0
-    (tmp_path / "a.yaml").write_text("file: mine\n")
-    assert lowalt(line) == 2
-    assert "a.yaml: is there already and no draft" in capsys.readouterr().err
+    draft = (tmp_path / "a.yaml").read_text()
+    for kept in ("file: mine\n", draft + "empty_s: [0, 3]\n", draft.replace("int16", "uint16")):
+        assert kept != draft
+        (tmp_path / "a.yaml").write_text(kept)
+        assert lowalt(line) == 2
+        assert "a.yaml: is there already and no draft" in capsys.readouterr().err
+        assert (tmp_path / "a.yaml").read_text() == kept
 
 
 def test_without_a_carrier_the_next_command_asks_for_it(tmp_path, capsys, monkeypatch):
@@ -80,6 +84,23 @@ def test_without_a_carrier_the_next_command_asks_for_it(tmp_path, capsys, monkey
         "channel": "complex",
         "columns": [0, 1],
     }
+
+
+@pytest.mark.parametrize("kind", ["stereo WAV", "csv"])
+def test_the_draft_of_a_rate_that_the_file_contradicts_is_read(kind, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    if kind == "csv":
+        path = tmp_path / "a.csv"
+        values = echo()
+        columns = [np.arange(len(values)) / RATE, values.real, values.imag]
+        np.savetxt(path, np.stack(columns, 1), delimiter=",", header="time_s,I,Q", comments="")
+    else:
+        path = WRITTEN["written"](kind, echo(), tmp_path)
+    line = ["recording", "inspect", path.name, "--carrier", "3.3e9", "--rate", "4000"]
+    assert lowalt(line) == 0
+    said = capsys.readouterr().out
+    assert "note: the file states a rate of 5000 Hz: with `trust: record` the stated 4000" in said
+    assert read(read_record(path.with_suffix(".yaml"))).rate_hz == 4000
 
 
 def test_hum_a_constant_part_and_an_image_are_pointed_out(tmp_path):

@@ -141,6 +141,11 @@ def test_damaged_and_unknown_files_are_refused_by_name(tmp_path):
         ({"dtype": "object"}, r"here: dtype: value 'object', expected one of"),
         ({"trust": "file", "rate_hz": RATE}, r"here: trust: value 'file', expected one of"),
         ({"trust": "record"}, r"expected trust together with rate_hz"),
+        ({"empty_s": [3, 1]}, r"here: empty_s: value \[3, 1\], expected the least number first"),
+        (
+            {"twin": {"distance_m": [10, 1]}},
+            r"here: twin.distance_m: value \[10, 1\], expected the least number first",
+        ),
     ],
 )
 def test_a_wrong_record_is_refused_by_key(tmp_path, change, words):

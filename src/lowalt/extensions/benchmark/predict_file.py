@@ -115,7 +115,7 @@ class PredictFile:
             yield
         except InputError:
             raise
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             if not unnamed:
                 raise InputError(
                     f"{self.path}: {type(error).__name__}: {in_one_line(error)}"

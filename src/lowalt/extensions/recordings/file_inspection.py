@@ -342,6 +342,10 @@ def _inspected(path: Path, carrier_hz: float | None, rate_hz: float | None) -> F
         )
         if given is not None or own is not None
     )
+    contradicted = rate_hz and own_rate and abs(rate_hz / own_rate - 1) > faults.RATE_SHARE
+    if contradicted:
+        # Without this key the record of the user's rate is refused.
+        candidates = [one._replace(keys={**one.keys, "trust": "record"}) for one in candidates]
     carrier_hz = carrier_hz or own_carrier
     rate_hz = rate_hz or own_rate
     found = []
@@ -358,6 +362,12 @@ def _inspected(path: Path, carrier_hz: float | None, rate_hz: float | None) -> F
             f"{path}: nothing in it reads as a signal, expected samples of one or two channels"
         )
     notes = _notes(path, found[0], rate_hz, carrier_hz)
+    if contradicted:
+        notes.insert(
+            0,
+            f"the file states a rate of {own_rate:.6g} Hz: with `trust: record` the stated "
+            f"{rate_hz:.6g} Hz holds",
+        )
     powers = next(
         (
             one

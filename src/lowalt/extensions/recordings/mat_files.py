@@ -169,7 +169,10 @@ def main(arguments: list[str]) -> None:
     read = _new if HDF5 in (start[:8], start[512:]) else _old
     variables = read(source, int(most))
     arrays: dict[str, Any] = {str(number): value for number, value in enumerate(variables.values())}
-    np.savez(out, names=np.array(json.dumps(list(variables))), **arrays)
+    try:
+        np.savez(out, names=np.array(json.dumps(list(variables))), **arrays)
+    except OSError:
+        sys.exit(f"no room for its arrays in {Path(out).parents[1]}, expected another TMPDIR")
 
 
 if __name__ == "__main__":

@@ -5,6 +5,7 @@ a recogniser.
 import argparse
 import math
 import shlex
+import zlib
 from pathlib import Path
 
 from lowalt.commands.command_line import Answer, add_command, add_group, positive
@@ -14,8 +15,8 @@ from lowalt.files.atomic import write_file
 from lowalt.files.errors import InputError
 from lowalt.files.shipped import shipped
 
-DRAFTED = "# Drafted by `lowalt recording inspect`."
-"""First line of a draft; only a file that begins with it is written over."""
+DRAFTED = "# Drafted by `lowalt recording inspect`"
+"""How a draft begins."""
 WORDS = {
     "iqiq": "I and Q in turn",
     "iiqq": "all I, then all Q",
@@ -138,7 +139,6 @@ def drafted(inspection: FileInspection, seen: Seen, folder: Path) -> str:
         )
     path = recording.relative_to(folder.resolve()).as_posix()
     lines = [
-        DRAFTED,
         "# Confirm the lines marked GUESSED.",
         f"file: {path!r}",
         f"carrier_hz: {inspection.carrier_hz:.9g}",
@@ -157,7 +157,24 @@ def drafted(inspection: FileInspection, seen: Seen, folder: Path) -> str:
         "# For `lowalt recording train`, with your own figures (m, m, degrees):",
         f"# twin: {{waveform: {waveform}, distance_m: [2, 10], height_m: [-1, 2], beam_deg: 60}}",
     ]
-    return "\n".join(lines) + "\n"
+    return _with_first_line("\n".join(lines) + "\n")
+
+
+def _with_first_line(body: str) -> str:
+    """A draft of these lines; the checksum in its first line shows whether anybody edited them."""
+    return f"{DRAFTED}, checksum {zlib.crc32(body.encode()):08x}.\n{body}"
+
+
+def _refuse_to_write_over(out: Path) -> None:
+    """Refuse a file that is no draft, or a draft that somebody edited."""
+    if not out.is_file():
+        return
+    text = out.read_text(errors="replace")
+    if text != _with_first_line(text.partition("\n")[2]):
+        raise InputError(
+            f"{out}: is there already and no draft as it was written, expected --out with another "
+            "name"
+        )
 
 
 def _next(inspection: FileInspection, seen: Seen, out: Path) -> str:
@@ -205,8 +222,8 @@ def _inspect(options: argparse.Namespace) -> Answer:
     seen = inspection.readings[options.take - 1]
     out = options.out or _draft_path(inspection.path)
     ready = bool(inspection.carrier_hz and inspection.rate_hz)
-    if ready and out.is_file() and not out.read_text(errors="replace").startswith(DRAFTED):
-        raise InputError(f"{out}: is there already and no draft, expected --out with another name")
+    if ready:
+        _refuse_to_write_over(out)
     picture = Path(f"{options.file.stem}-inspect.png")
     write_file(
         picture, recording_picture(inspection, [_described(one) for one in inspection.readings])
