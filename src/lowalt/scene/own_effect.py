@@ -51,6 +51,7 @@ def _guarded(name: str, function: Callable) -> Callable:
 
     @functools.wraps(function)
     def called(*arguments: Any) -> Any:
+        """The function itself, its errors as one sentence that names the file."""
         with running(f"effects: {name}", name):
             return function(*arguments)
 
