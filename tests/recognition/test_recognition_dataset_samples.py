@@ -19,7 +19,6 @@ from lowalt.recognition import samples
 from lowalt.recognition.__main__ import main
 from lowalt.recognition.dataset_samples import DatasetSamples, opened, stations_of
 from lowalt.recognition.views import ShardSamples
-from lowalt.scene import chain
 from lowalt.shards import maker
 from lowalt.shards.build import write_run
 from lowalt.shards.dataset import Dataset
@@ -164,7 +163,7 @@ def test_only_the_stations_that_a_scheme_sees_are_computed(run, effects, monkeyp
 
     monkeypatch.setattr(maker, "clean_signals", heard(maker.clean_signals, lambda given: given[1]))
     monkeypatch.setattr(
-        chain, "scene_signals", heard(chain.scene_signals, lambda given: [given[1]])
+        maker, "scene_signals", heard(maker.scene_signals, lambda given: [given[1]])
     )
     dataset.maker.echo["effects"] = effects
     row = dataset.row(dataset.place(3))

@@ -85,22 +85,17 @@ def refuse_contradictions(config: dict, published: dict, classes: tuple[str, ...
         refuse_values(config)
 
 
-def _refuse_ranges(key: str, ranges: dict, names: Collection[str], expected: str) -> None:
-    """Refuse ranges (m) with an unknown name or with the larger value first."""
+def _refuse_names(key: str, ranges: dict, names: Collection[str], expected: str) -> None:
+    """Refuse ranges of unknown names."""
     unknown = sorted(set(ranges) - set(names))
     if unknown:
         raise InputError(f"{key}: {unknown}, expected {expected}")
-    for name, (low, high) in ranges.items():
-        if low > high:
-            raise InputError(
-                f"{key}: {name} from {low} to {high} m, expected the smaller value first"
-            )
 
 
 def refuse_sizes(config: dict, classes: tuple[str, ...]) -> None:
-    """Refuse sizes of unknown classes, reversed ranges, and sizes together with effects."""
+    """Refuse sizes of unknown classes, and sizes together with effects."""
     sizes = config["motion"].get("sizes_m", {})
-    _refuse_ranges("motion.sizes_m", sizes, classes, f"some of the classes {list(classes)}")
+    _refuse_names("motion.sizes_m", sizes, classes, f"some of the classes {list(classes)}")
     if sizes and config["effects"]:
         raise InputError(
             f"motion.sizes_m: given together with effects {sorted(config['effects'])}, expected "
@@ -173,7 +168,7 @@ def refuse_heights(heights: dict, published: dict, classes: tuple[str, ...]) -> 
     """Refuse flight heights of names that are no subtypes or classes, and reversed ranges."""
     known = {*published, *classes, *CATEGORIES}
     expected = f"subtypes, classes {list(classes)} or {list(AIRBORNE)}"
-    _refuse_ranges("motion.height_m", heights, known, expected)
+    _refuse_names("motion.height_m", heights, known, expected)
 
 
 def refuse_data(config: dict) -> None:
