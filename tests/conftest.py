@@ -20,7 +20,6 @@ LONG = (
     "test_contributing",
     "test_recognition_resume",
     "test_benchmark",
-    "test_any_radar",
     "test_benchmark_commands",
     "test_strangers_package",
     "test_studies",

@@ -79,6 +79,7 @@ def test_drawn_radars_lie_in_their_ranges_and_none_is_a_measured_one():
     assert alike(first, near, block["apart"]) and not alike(again, near, block["apart"])
 
 
+@pytest.mark.slow
 def test_the_table_has_each_labelled_recording_next_to_the_radar_s_own_network(
     tmp_path, monkeypatch
 ):

@@ -62,7 +62,8 @@ def serving(folder: Path, answers: dict | None = None) -> Iterator[ThreadingHTTP
     server.sent = {}
     server.connections = 0
     server.address = f"http://127.0.0.1:{server.server_port}"
-    threading.Thread(target=server.serve_forever, daemon=True).start()
+    # The server looks for the end this often (s), and each test waits for its end.
+    threading.Thread(target=server.serve_forever, args=(0.01,), daemon=True).start()
     yield server
     server.shutdown()
     server.server_close()
