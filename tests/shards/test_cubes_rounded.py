@@ -2,6 +2,7 @@
 as was said.
 """
 
+import io
 import json
 from types import SimpleNamespace
 
@@ -186,3 +187,8 @@ def test_cubes_with_companions_have_a_card_that_types_their_truth(tmp_path):
     cube = next(entry for entry in features(shards)[2]["struct"] if entry["name"] == "cube")
     others = next(entry for entry in cube["struct"][0]["struct"] if entry["name"] == "others")
     assert [entry["name"] for entry in others["list"]] == list(TRUTH)
+    _, stored = shards.members(0)
+    data = features(shards)[3]
+    for _ in range(np.load(io.BytesIO(stored)).ndim):
+        data = data["list"]
+    assert data == "float32"

@@ -11,10 +11,11 @@ from dataset import publish
 from lowalt.__main__ import main as lowalt
 from lowalt.config.layers import load, plain
 from lowalt.files.errors import InputError
-from lowalt.shards import manifest
+from lowalt.shards import ShardSet, manifest
 from lowalt.shards.build import main, write_run
 from lowalt.shards.dataset import Dataset
 from options import words
+from stage_runs import check_members
 
 
 def test_a_configuration_and_clouds_are_a_whole_data_set(dataset, tmp_path, monkeypatch, capsys):  # noqa: F811
@@ -34,6 +35,16 @@ def test_a_configuration_and_clouds_are_a_whole_data_set(dataset, tmp_path, monk
     with pytest.raises(SystemExit):
         manifest.main(words("check", run="other", manifest="run.sha256"))
     assert capsys.readouterr().out.startswith("motion: motion/seen-00000.csv differs")
+
+
+def test_each_chunk_has_the_motion_models_after_those_of_the_chunk_before(tmp_path):
+    config = configuration()
+    config["targets"]["select"] = ["Owl"]
+    config["motion"] |= {"models": 8, "models_per_chunk": 4}
+    two = Dataset(config)
+    write_run(two, tmp_path, "signal")
+    assert len(two.plan.chunks) == 2
+    check_members(two, ShardSet(tmp_path / "shards/index.json"))
 
 
 def test_a_run_s_data_set_opens_in_a_folder_without_its_tables(tmp_path, monkeypatch):

@@ -125,7 +125,11 @@ def test_noise_passes_the_canceller_of_a_scene_and_noise_that_effects_add_is_ref
     config["targets"]["select"] = ["Owl"]
     scene = Dataset(config)
     write_run(scene, tmp_path, "recipe")
-    check_members(scene, ShardSet(tmp_path / "shards/index.json"))
+    shards = ShardSet(tmp_path / "shards/index.json")
+    check_members(scene, shards)
+    # The canceller leaves neither the echo nor noise a mean; that of 400 values of noise is 5 %.
+    signal = shards.signal(int(np.argmin(shards.snrs_db)))
+    assert abs(signal.mean(axis=1)).max() < 0.01 * abs(signal).mean()
     with pytest.raises(InputError, match="cell_noise"):
         clean.refuse({"cell_noise": {}})
 

@@ -118,6 +118,10 @@ FAULTS = {
         ("logits = level(images)", "logits = level(image)"),
         "NameError: name 'image' is not defined",
     ),
+    "an end of the process": (
+        ("logits = level(images) @ weights", "raise SystemExit(0)"),
+        "SystemExit: 0",
+    ),
     "statistics of the test": (
         ("level(images) @", "(level(images) - level(images).mean(0)) @"),
         "when it is alone",
