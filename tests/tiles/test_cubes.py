@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import pointwise_echo
+from lowalt.config.blocks import render_blocks
 from lowalt.config.layers import merge
 from lowalt.config.network import SPEED_OF_LIGHT
 from lowalt.echo import Rigid
@@ -25,6 +26,7 @@ from lowalt.shards.stored_cubes import cubes_of, of_cubes
 from lowalt.spectra import Spectra, spectrum
 from lowalt.spectra.cube import TRUTH, Cube
 from lowalt.spectra.kinds import hrrp, range_doppler
+from lowalt.tiles import triangle
 from lowalt.tiles.cubes import Cubes
 from lowalt.tiles.render import Renderer, split
 from small_configuration import configuration
@@ -202,10 +204,20 @@ def test_axes_are_metres_and_metres_a_second(dataset):
     assert hrrp.axes(hrrp.Settings(2, 1, 9), network, station)[0][2] == pytest.approx(398 * 2.5e-3)
 
 
+@pytest.mark.parametrize("name", sorted(SHOWN))
+def test_images_of_cells_are_the_resampled_definition(dataset, name):
+    renderer = Renderer.from_settings(render_blocks(dataset.config))
+    cube = cubes_of_row(dataset.maker, dataset.row(dataset.place(0)), SNRS[0])[1]
+    found = np.empty((32, 32), np.float32)
+    renderer.values(cube, 1, name, found)
+    values = spectrum(name).definition(cube, renderer.spectra[name])
+    expected = triangle(len(values), 32) @ values @ triangle(values.shape[1], 32).T
+    # The largest range is on top.
+    np.testing.assert_allclose(found, expected[::-1], atol=1e-5 * values.max())
+
+
 def test_a_signal_alone_gives_no_image_of_cells(dataset):
-    renderer = Renderer.from_settings(
-        {name: dataset.config[name] for name in ("network", "spectra", "images")}
-    )
+    renderer = Renderer.from_settings(render_blocks(dataset.config))
     signals = np.ones((3, renderer.network.symbols), np.complex64)
     for ask in (lambda: renderer.tile(signals), lambda: renderer.some(signals, [3])):
         with pytest.raises(InputError, match="made of range cells, and a signal alone"):
