@@ -5,9 +5,10 @@ recordings of cars.
 
 `lowalt recording train` simulates an HB100 module (10.525 GHz, one real channel) by the record of
 one recording (`fourth_radar.yaml`), of which it takes the noise floor alone, and trains one network
-for each training seed. The table measured-fourth.csv has the labelled windows of each recording by
-what `lowalt predict` says of them with each network (`hb100-SEED`), and with `KNOWN`, which learned
-another radar near that carrier. The recordings were used for no decision.
+for each training seed (`hb100-SEED`). Simulated windows are drawn by the network's name, so each
+network learns from windows of its own. The table measured-fourth.csv has the labelled windows of
+each recording by what `lowalt predict` says of them with each network, and with `KNOWN`, which
+learned another radar near that carrier. The recordings were used for no decision.
 """
 
 import argparse
