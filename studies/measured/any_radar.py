@@ -335,7 +335,7 @@ def asked(
     """Return the recordings to ask about, each with its radar's name and twin: those of the
     measured sets, and those of the HB100 modules, which are test files.
 
-    half: take no other.
+    half: of the recordings, the only one that is taken; None for both.
     """
     found = [
         (one.radar, library.twins[one.radar], one) for one in usable(recordings(inputs), library)
@@ -534,7 +534,7 @@ def write_refused(
     measured: dict[str, Twin],
     options: argparse.Namespace,
 ) -> None:
-    """Train the network that refuses, write its table, and draw what the first seed's one says."""
+    """Train the network that refuses, write its table, and draw what that of the first seed says."""
     block = drawing.block
     folds = folds_of(drawing, REFUSING, options.models)
     known = folds["validation"].facts.label < len(CATEGORIES)

@@ -63,7 +63,7 @@ class Perturbations(NamedTuple):
     def at(self, times_s: np.ndarray) -> Perturbation | None:
         """Return their sum at times_s (K,) s.
 
-        It is linear between the instants given and exact on them; None for none.
+        It is linear between the given instants and exact on them; None if there is no change.
         """
         if not self.changes:
             return None
@@ -75,7 +75,7 @@ class Perturbations(NamedTuple):
         return Perturbation(angles, offset_m, self._total("tilt_rad", times_s))
 
     def _total(self, name: str, times_s: np.ndarray) -> np.ndarray | None:
-        """The sum (K, 3) of those of the changes' tables (G, 3) that there are, None for none."""
+        """The sum (K, 3) of a table (G, 3) over the changes that have it, None if none of them has."""
         result = None
         for change in self.changes:
             table = getattr(change, name)
