@@ -211,8 +211,8 @@ def test_a_run_s_configuration_names_no_folder_of_inputs_outside(doors, entry, a
 def test_a_run_s_configuration_is_known_in_every_disguise(
     doors, entry, path, beside, whole, linked, capsys
 ):
-    """A whole configuration is that of a run, and so is one that lies beside the files of a run.
-    Neither its name nor a link to it changes that.
+    """A whole configuration counts as that of a run, and so does an overlay that lies beside the
+    files of a run. Neither the name of the file nor a link to it changes that.
     """
     config = attacked(doors, CODE["an effect beside the run"])
     held_path = doors / (linked or path)

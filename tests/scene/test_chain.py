@@ -262,3 +262,6 @@ def test_noise_at_an_snr_of_zero_has_a_stream_of_its_own():
     zero = asked.stream("cell_noise", row).random()
     assert zero != asked.at_snr(3.0).stream("cell_noise", row).random()
     assert zero != asked.at_snr(None).stream("cell_noise", row).random()
+    # No other effect's stream follows the SNR.
+    other = asked.stream("phase_noise", row).random()
+    assert other == asked.at_snr(3.0).stream("phase_noise", row).random()
