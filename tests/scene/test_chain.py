@@ -188,11 +188,14 @@ def test_on_a_link_every_path_out_meets_every_path_back():
     assert seen_paths(link_of({"walls": FACADES}), walls, FACADES) == [3, 1]
 
 
-def test_without_effects_the_signal_is_the_echo_engines_to_the_last_bit():
+@pytest.mark.parametrize("effects", [{}, {"mean_cross_section": {}}])
+def test_the_signal_of_a_target_alone_is_the_echo_engines_to_the_last_bit(effects):
     cloud, row = target(np.random.default_rng(2))
-    found = received_signal(scene({}), A, cloud, row)
-    view = observe(scene({}), A, cloud, row)
-    engine = echo_signal(network(), A, view.motion, cloud.rcs_m2, view.aim_m)
+    asked = scene(effects)
+    found = received_signal(asked, A, cloud, row)
+    view = observe(asked, A, cloud, row)
+    assert (view.cloud.rcs_m2 == cloud.rcs_m2).all() == (not effects)
+    engine = echo_signal(network(), A, view.motion, view.cloud.rcs_m2, view.aim_m)
     np.testing.assert_array_equal(found.signal, engine.signal)
 
 
